@@ -59,7 +59,7 @@ def check(
     console.print(checked.headline())
     result = checked.as_dict()
     console.print(f"{flight.name}: {result['samples']} rows, read by {checked.read_by}")
-    show_table(("what flew", "", "by"), checked.what_flew())
+    show_table(("vehicle and flight", "", "source"), checked.what_flew())
     show_table(
         ("channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit"),
         [

@@ -57,6 +57,7 @@ def identify(
     from ..identification.vehicle_fit.report import (
         headline,
         identified_data,
+        reasons_of,
         table_of,
         use_of,
         write_identified,
@@ -101,10 +102,7 @@ def identify(
             for e in identified.estimates.values()
         ],
     )
-    for e in identified.estimates.values():
-        if e.status in ("assumed", "not identifiable"):
-            console.print(f"{e.name}: {e.status}: {e.how}")
-    for line in identified.advice:
+    for line in (*reasons_of(identified), *identified.advice):
         console.print(line)
     for of, (vehicle, simplest) in identified.predicted.items():
         after = f"{vehicle.horizon[-1]:.2g} s after {vehicle.starts} starts"

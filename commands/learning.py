@@ -33,17 +33,17 @@ def train(
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
     from ..evaluation.rewards import find_reward
-    from ..evaluation.tasks import import_files, task_of
+    from ..evaluation.tasks import import_files
     from ..training.configuration import load_config
     from ..training.run import Progress, read_progress
     from ..training.train import train as learn
-    from ..training.training_envs import check_training_env
+    from ..training.training_envs import training_task
 
     need("stable_baselines3", "rl")
     if algorithm == "recurrent-ppo":
         need("sb3_contrib", "rl")
     import_files(imports or ())
-    known = task_of(task or STANDARD_TASK)
+    known = training_task(task or STANDARD_TASK)
     if reward is not None:
         find_reward(reward)
     values = [*(setting or []), *([f"steps={steps}"] if steps else [])]
@@ -54,15 +54,15 @@ def train(
         return _tune(load_config(algorithm, values, config), scenario or "base", seed, out)
     given = load_config(algorithm, values, config, task=task)
     scenario = scenario or known.flown_in
-    check_training_env(scenario, task or STANDARD_TASK)
+    known.scenario(scenario)
     if cluster:
         need("ray", "cluster")
     what: dict[str, Any] = {
         "task": task or STANDARD_TASK,
         "observation": observation,
         "reward": reward,
+        "imports": tuple(imports or ()),
     }
-    what |= {"reward": reward, "imports": tuple(imports or ())}
     folder = results_folder(
         out,
         algorithm=given["algorithm"],

@@ -130,7 +130,7 @@ def _how_to_make_a_vehicle(log: Path, reading: LogOptions) -> str:
 
 def _tell(step: Any) -> None:
     console.print(f"{step.title}: {' '.join(step.sentences)}")
-    console.print(f"  {step.command}", soft_wrap=True, style="dim")
+    console.print(f"  this step alone: {step.command}", soft_wrap=True, style="dim")
 
 
 def _what_it_holds(checked: Mapping[str, Any]) -> tuple[str, ...]:

@@ -14,13 +14,11 @@ angles, with first-order motors. Along the vertical the rotors produce ``a`` beh
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.effects import compile_effects
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array
 from .flight import FlightGains
-
-Array = NDArray[np.float64]
 
 MOTOR_LAG = 0.04  # s, in the tasks' plant
 PLACE, SPEED, TILT, RATE, ALPHA = range(5)  # states of a horizontal axis; then the integral

@@ -6,11 +6,9 @@ Further states are the external wrench, the wrench filter's estimate, and an acc
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.arrays import Array
 from .axis_models import RATE, SPEED, TILT, AxisModel
-
-Array = NDArray[np.float64]
 
 _BELIEVED = 1e-12  # added to the variance of each state, so that the equations can be solved
 _BIAS_TIME = 300.0  # s, over which the accelerometer's bias lasts

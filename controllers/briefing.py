@@ -11,10 +11,11 @@ from functools import cache, partial
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
+from ..runtime.arrays import Array
 
 # the vehicle of the tasks
 standard_vehicle = cache(partial(load_vehicle, "ardrone2"))
@@ -80,7 +81,7 @@ class Jet:
 
 # places (n,) m after times (s) of motions with a largest speed (m/s) over a travel (m), from 0 to
 # positive places first
-PLACES: dict[str, Callable[..., NDArray[np.float64]]] = {
+PLACES: dict[str, Callable[..., Array]] = {
     "still": lambda speed, travel, time: 0.0 * (speed * time),
     "sine": lambda speed, travel, time: travel * np.sin(speed / travel * time),
     "triangle": lambda speed, travel, time: (

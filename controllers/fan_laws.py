@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.arrays import Floats
 from .observation import DECISION_PERIOD, FORCE_X, MAX_COMMAND, TORQUE_Y, TORQUE_Z
-
-Array = NDArray[np.floating[Any]]
 
 
 class _FanLaw:
@@ -34,11 +32,11 @@ class _FanLaw:
         last, self._last = self._last, x
         return 0.0 if last is None else (x - last) / DECISION_PERIOD
 
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+    def command(self, o: Floats, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return the wanted velocity along each commanded axis, m/s."""
         raise NotImplementedError
 
-    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
+    def __call__(self, observation: Floats, info: Mapping[str, Any] | None = None) -> Floats:
         """Return the command (1,) m/s for an observation (8,), or (2,) for one of (10,)."""
         wanted = self.command(observation, info)
         return np.clip(wanted, -MAX_COMMAND, MAX_COMMAND).astype(np.float32)
@@ -50,7 +48,7 @@ class Hover(_FanLaw):
 
     axes: int = 1  # that are commanded
 
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+    def command(self, o: Floats, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return no velocity."""
         return (0.0,) * self.axes
 
@@ -66,7 +64,7 @@ class Admittance(_FanLaw):
     gain: float = 18.0  # m/s per Nm, sideways
     gain_z: float | None = None  # m/s per Nm, up and down; None: not commanded
 
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+    def command(self, o: Floats, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-gain tau_z``, and ``gain_z tau_y``."""
         if self.gain_z is None:
             return (-self.gain * o[TORQUE_Z],)
@@ -82,7 +80,7 @@ class Ratio(Admittance):
     gain: float = 8.0  # m/s per m, as ``gain_z``
     least_force: float = 0.1  # N, below which the force is held to be no jet at all
 
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+    def command(self, o: Floats, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-gain tau_z / f_x``, and ``gain_z tau_y / f_x``."""
         force = max(float(o[FORCE_X]), self.least_force)
         return tuple(each / force for each in super().command(o, info))
@@ -100,7 +98,7 @@ class Lead(_FanLaw):
     lead: float = 2.79  # m/s per m/s
     least_force: float = 0.183  # N, below which the force is held to be no jet at all
 
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+    def command(self, o: Floats, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-(gain x + lead dx/dt)``."""
         x = float(o[TORQUE_Z]) / max(float(o[FORCE_X]), self.least_force)
         return (-(self.gain * x + self.lead * self._rate(x)),)
@@ -124,7 +122,7 @@ class AdmittancePID(_FanLaw):
         super().reset()
         self._sum = 0.0
 
-    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+    def command(self, o: Floats, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return the sum of the three parts."""
         torque = float(o[TORQUE_Z])
         proportional = self.gain * torque + self.lead * self._rate(torque)

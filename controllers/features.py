@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..runtime.arrays import Mask, Single
 from ..runtime.errors import InputError, unknown_name
 from .observation import (
     DECISION_PERIOD,
@@ -19,8 +20,6 @@ from .observation import (
     TORQUE_Z,
     VELOCITY_Y,
 )
-
-Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -82,16 +81,16 @@ class Features:
         """Number of a policy's inputs."""
         return self.history * len(self.frame)
 
-    def frames(self, observations: ArrayLike) -> Array:
+    def frames(self, observations: ArrayLike) -> Single:
         """Return scaled frames (n, quantities) of n environments' observations (n, 8)."""
         rows = np.asarray(observations, dtype=np.float64)
         scaled = rows[:, [QUANTITIES[name].column for name in self.frame]] / np.array(self.scale)
         scaled[:, self.summed] *= DECISION_PERIOD  # change of one decision
-        clipped: Array = np.clip(scaled, -10.0, 10.0).astype(np.float32)
+        clipped: Single = np.clip(scaled, -10.0, 10.0).astype(np.float32)
         return clipped
 
     @property
-    def mirrored(self) -> Array:
+    def mirrored(self) -> Single:
         """Signs (size,) of a policy's inputs where left and right change places."""
         signs = [-1.0 if QUANTITIES[name].odd else 1.0 for name in self.frame]
         return np.array(signs * self.history, dtype=np.float32)
@@ -114,7 +113,7 @@ class History:
         self._summed = features.summed
         self._frames = np.zeros((count, features.history, len(features.frame)), dtype=np.float32)
 
-    def restart(self, frames: Array, which: slice | NDArray[np.bool_] = _ALL) -> None:
+    def restart(self, frames: Single, which: slice | Mask = _ALL) -> None:
         """Begin an episode in the environments ``which`` with their rows of ``frames`` (n,
         quantities).
         """
@@ -122,14 +121,14 @@ class History:
         for column in self._summed:
             self._frames[which, :, column] = 0.0
 
-    def push(self, frames: Array) -> None:
+    def push(self, frames: Single) -> None:
         """Add one frame (n, quantities) each."""
         sums = self._frames[:, -1, self._summed]
         self._frames[:, :-1] = self._frames[:, 1:]
         self._frames[:, -1] = frames
         self._frames[:, -1, self._summed] += sums
 
-    def flat(self) -> Array:
+    def flat(self) -> Single:
         """Return a copy (n, history * quantities)."""
-        flat: Array = self._frames.reshape(len(self._frames), -1).copy()
+        flat: Single = self._frames.reshape(len(self._frames), -1).copy()
         return flat

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from ..dynamics.effects import compile_effects
@@ -20,9 +19,8 @@ from ..dynamics.mean_jet import (
     jet_table,
 )
 from ..dynamics.vehicle import EffectSetting, Vehicle
+from ..runtime.arrays import Array
 from .briefing import Air, Jet
-
-Array = NDArray[np.float64]
 
 FIRST, STEP, COUNT = -3.0, 0.02, 301  # m, offsets of the tables
 AXES = 3  # torque z, force x, force y

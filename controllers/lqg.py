@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array, Floats
 from ..runtime.errors import InputError
 from .axis_models import TILT, AxisModel, axis_models, tilting
 from .axis_observer import AxisObserver, WrenchProcess, axis_filter
@@ -31,8 +31,6 @@ from .wind_observation import (
     WIND_PERIOD,
 )
 
-Array = NDArray[np.floating[Any]]
-Wide = NDArray[np.float64]
 _TURN_TIME = 0.3  # s, over which the reference goes on to change its acceleration
 _LOOK = 25  # decisions
 _POSITIVE = ("effort", "force", "torque", "force_time", "torque_time", "estimate_lag", "bias")
@@ -98,9 +96,9 @@ class LQG:
         for observer, *_ in self.laws:
             observer.reset()
         self._action = np.zeros(3)
-        self._wanted: Wide | None = None  # acceleration of the reference, in tilts and m/s2
+        self._wanted: Array | None = None  # acceleration of the reference, in tilts and m/s2
 
-    def _law(self, axis: AxisModel) -> tuple[AxisObserver, Wide, float]:
+    def _law(self, axis: AxisModel) -> tuple[AxisObserver, Array, float]:
         """Return the observer of an axis, the regulator's gain (n,) on its states, and the gain on
         the reference's last turn. The turn is expected to go on.
         """
@@ -120,7 +118,7 @@ class LQG:
         lasts = np.exp(-WIND_PERIOD / _TURN_TIME * np.arange(1, _LOOK + 1))
         return AxisObserver(model), gain, float(lasts @ ahead[:, 0])
 
-    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
+    def __call__(self, observation: Floats, info: Mapping[str, Any] | None = None) -> Floats:
         """Return the action (3,) m/s2 for an observation (27,)."""
         o = np.asarray(observation, dtype=np.float64)
         place, speed = -o[POSITION_ERROR], o[VELOCITY] - o[REFERENCE_VELOCITY]

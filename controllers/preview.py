@@ -13,9 +13,9 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array, Floats
 from ..runtime.errors import InputError
 from .axis_models import PLACE, axis_models, tilting
 from .briefing import Briefing, standard_vehicle
@@ -27,13 +27,11 @@ from .wind_observation import (
     WIND_PERIOD,
 )
 
-Array = NDArray[np.floating[Any]]
-Wide = NDArray[np.float64]
 DISTURBANCE_TIME = 0.3  # s, over which the actuators' disturbance lasts
-Step = tuple[Wide, Wide, Wide]  # A (n, n), B (n, 1) and D (n, d) of a decision
+Step = tuple[Array, Array, Array]  # A (n, n), B (n, 1) and D (n, d) of a decision
 
 
-def regulator(A: Wide, B: Wide, effort: float) -> tuple[Wide, Wide, Wide]:
+def regulator(A: Array, B: Array, effort: float) -> tuple[Array, Array, Array]:
     """Return the linear-quadratic regulator's gain (1, n), its cost to go (n, n), and the command's
     factor (1, n) on a cost slope.
     """
@@ -46,7 +44,7 @@ def regulator(A: Wide, B: Wide, effort: float) -> tuple[Wide, Wide, Wide]:
     return turned @ cost @ A, cost, turned
 
 
-def preview(A: Wide, B: Wide, D: Wide, effort: float, count: int) -> tuple[Wide, Wide]:
+def preview(A: Array, B: Array, D: Array, effort: float, count: int) -> tuple[Array, Array]:
     """Return the gain (n,) on the state, and (count, d) on the disturbances of each decision from
     now on.
 
@@ -77,7 +75,7 @@ class _PreviewLaw:
         """Return the model of each axis."""
         raise NotImplementedError
 
-    def _look(self, o: Wide, info: Mapping[str, Any]) -> tuple[list[Wide], list[Wide]]:
+    def _look(self, o: Array, info: Mapping[str, Any]) -> tuple[list[Array], list[Array]]:
         """Return each axis's state (n,) and future disturbances (foresight, d)."""
         raise NotImplementedError
 
@@ -88,7 +86,7 @@ class _PreviewLaw:
     def reset(self) -> None:
         """Do nothing: an oracle has no memory."""
 
-    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
+    def __call__(self, observation: Floats, info: Mapping[str, Any] | None = None) -> Floats:
         """Return the command (axes,).
 
         Raises:
@@ -106,9 +104,9 @@ class _PreviewLaw:
         ]
         return np.clip(wanted, -self.largest, self.largest).astype(np.float32)
 
-    def _states(
-        self, info: Mapping[str, Any], place: Wide, speed: Wide, pushed: Wide
-    ) -> list[Wide]:
+    def along(
+        self, info: Mapping[str, Any], place: Array, speed: Array, pushed: Array
+    ) -> list[Array]:
         """Return the state (..., n) of each axis; ``place``, ``speed`` and ``pushed`` (..., 3) are
         the vehicle's relative to the target, and the target's acceleration.
         """
@@ -126,18 +124,18 @@ class _PreviewLaw:
 @lru_cache(maxsize=16)
 def _gains(
     steps: Callable[[Vehicle], list[Step]], vehicle: Vehicle, effort: float, count: int
-) -> list[tuple[Wide, Wide]]:
+) -> list[tuple[Array, Array]]:
     return [preview(*step, effort, count) for step in steps(vehicle)]
 
 
-def lasting(wrench: Wide, count: int, period: float) -> Wide:
+def lasting(wrench: Array, count: int, period: float) -> Array:
     """Return the mean rest (count, k) of a disturbance (k,) in decisions of ``period`` s."""
     middles = period * (np.arange(count) + 0.5)
-    remaining: Wide = np.exp(-middles / DISTURBANCE_TIME)[:, None] * wrench
+    remaining: Array = np.exp(-middles / DISTURBANCE_TIME)[:, None] * wrench
     return remaining
 
 
-def pushing(wrench: Wide) -> list[Wide]:
+def pushing(wrench: Array) -> list[Array]:
     """Return the parts of wrenches (n, 6) that move each axis: force, and on the first two the
     torque.
     """
@@ -164,13 +162,13 @@ class WindOracle(_PreviewLaw):
         """Return the models with an acceleration beside the flight loop's own as input."""
         return [axis.held(WIND_PERIOD) for axis in axis_models(vehicle)]
 
-    def states(self, o: Wide, info: Mapping[str, Any]) -> list[Wide]:
+    def states(self, o: Array, info: Mapping[str, Any]) -> list[Array]:
         """Return the state (..., n) of each axis for observations (..., 27) and true values."""
         place = info["position"] - info["reference"]
         speed = info["velocity"] - o[..., REFERENCE_VELOCITY]
-        return self._states(info, place, speed, o[..., REFERENCE_ACCELERATION])
+        return self.along(info, place, speed, o[..., REFERENCE_ACCELERATION])
 
-    def _look(self, o: Wide, info: Mapping[str, Any]) -> tuple[list[Wide], list[Wide]]:
+    def _look(self, o: Array, info: Mapping[str, Any]) -> tuple[list[Array], list[Array]]:
         return self.states(o, info), pushing(
             info["wrench_ahead"] + lasting(info["disturbance"], self.foresight, WIND_PERIOD)
         )
@@ -210,11 +208,11 @@ class Oracle(_PreviewLaw):
             models.append((A, B, np.hstack([D, fan])))
         return models
 
-    def _look(self, o: Wide, info: Mapping[str, Any]) -> tuple[list[Wide], list[Wide]]:
+    def _look(self, o: Array, info: Mapping[str, Any]) -> tuple[list[Array], list[Array]]:
         place = info["place"]
         fan = np.insert(info["fan_ahead"], 0, place[0], axis=1)  # it keeps its distance
         moves, off = np.diff(fan, axis=0), info["setpoint"] - fan[0]
-        states = self._states(info, place - fan[0], info["velocity"], np.zeros(3))
+        states = self.along(info, place - fan[0], info["velocity"], np.zeros(3))
         wrench = np.concatenate([info["force"], info["torque"]])
         comes = pushing(lasting(wrench, self.foresight, DECISION_PERIOD))
         return (

@@ -10,9 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..runtime.arrays import Floats
 from ..runtime.errors import unknown_name
 from ..runtime.python_file import is_file_name
 from ..runtime.yaml_file import read_yaml
@@ -40,9 +38,7 @@ class Controller(Protocol):
         """Forget the last episode."""
         ...
 
-    def __call__(
-        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
-    ) -> NDArray[np.floating[Any]]:
+    def __call__(self, observation: Floats, info: Mapping[str, Any] | None = None) -> Floats:
         """Return the command (1,) m/s for an observation (8,)."""
         ...
 

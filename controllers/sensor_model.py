@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..dynamics.effects import compile_effects
+from ..runtime.arrays import Array
 from .briefing import Briefing
 from .flight import FlightGains
 from .jet_map import AXES, COUNT, FIRST, STEP, jet_map
 from .observation import DECISION_PERIOD, FORCE_X, FORCE_Y, TORQUE_Z, VELOCITY_Y
 from .wrench_lag import ORDER, autoregressions, lags
-
-Array = NDArray[np.float64]
 
 _TYPICAL = 0.15  # m off the axis, where the noise is taken whose colour stands for all
 SETTLED = 19  # decisions of 80 ms that the filter has settled before the first observation

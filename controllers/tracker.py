@@ -17,8 +17,8 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.arrays import Array, Floats, Index, Single
 from .axis_models import PLACE, SET_POINT, axis_models
 from .axis_observer import AxisFilter, AxisObserver, WrenchProcess, axis_filter
 from .briefing import PLACES, Air, Briefing
@@ -26,8 +26,6 @@ from .observation import DECISION_PERIOD, MAX_COMMAND
 from .preview import preview, pushing
 from .sensor_model import MEMORY, Sensing, sensor_model
 from .wrench_lag import lags
-
-Array = NDArray[np.float64]
 
 _ALONG_Y, _LOOK = 1, 24  # commanded axis; decisions of preview in ``Limit``
 # the wrench along y, N and Nm: standard deviations and correlation times (s)
@@ -94,14 +92,12 @@ class _Belief(ABC):
     def _move(self) -> None:
         """Carry particles on by one decision."""
 
-    def _choose(self, chosen: NDArray[np.int64]) -> None:
+    def _choose(self, chosen: Index) -> None:
         """Keep the chosen particles (n,)."""
         for name in self._arrays:
             setattr(self, name, getattr(self, name)[chosen])
 
-    def __call__(
-        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
-    ) -> NDArray[np.float32]:
+    def __call__(self, observation: Floats, info: Mapping[str, Any] | None = None) -> Single:
         """Return the command (1,) m/s for an observation (8,)."""
         sensing = self._sensing
         sensing.look(observation)
@@ -123,7 +119,7 @@ class _Belief(ABC):
             self._choose(np.minimum(np.searchsorted(np.cumsum(shares), even), n - 1))
         return np.array([command], dtype=np.float32)
 
-    def _command(self, observation: NDArray[np.floating[Any]], shares: Array) -> float:
+    def _command(self, observation: Floats, shares: Array) -> float:
         """Return the velocity to command, m/s; ``shares`` (n,) are the particles' weights."""
         offset, velocity = self.mean
         command = (
@@ -234,7 +230,7 @@ class InformedTracker(_Belief):
             place[some] += self._sign[some] * place_after(speed[some], travel[some], time)
         return place
 
-    def _choose(self, chosen: NDArray[np.int64]) -> None:
+    def _choose(self, chosen: Index) -> None:
         super()._choose(chosen)
         noise, keep = self._rng.standard_normal(self._motion.shape), np.sqrt(1.0 - self.spread**2)
         # speed and offset count with the sign that they are flown with
@@ -277,7 +273,7 @@ class _Regulated(_Belief):
     def _ahead(self, seconds: float) -> Array:
         """Return the fan's expected place after some time for each particle, (n,) m."""
 
-    def _command(self, observation: NDArray[np.floating[Any]], shares: Array) -> float:
+    def _command(self, observation: Floats, shares: Array) -> float:
         sensing = self._sensing
         # every second decision, and evenly between
         knots = np.arange(0, _LOOK + 1, 2)

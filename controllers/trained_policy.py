@@ -13,20 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.arrays import Floats, Single
 from ..runtime.errors import InputError
 from ..runtime.file_limits import LIMITS
 from ..runtime.page_files import write_text
-from ..runtime.regular_files import check_archive, read_bytes, read_json
+from ..runtime.regular_files import check_archive, read_bytes, read_json, reading
 from ..runtime.whole_files import replaced
 from .features import Features, History
 from .observation import MAX_COMMAND
 
-Array = NDArray[np.float32]
-Weights = dict[str, Array]
+Weights = dict[str, Single]
 FORMAT = 1
-_ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
+_ACTIVATIONS: dict[str, Callable[[Single], Single]] = {
     "relu": lambda x: np.maximum(x, np.float32(0.0)),
     "tanh": np.tanh,
 }
@@ -37,7 +36,7 @@ def layers_of(weights: Weights) -> int:
     return sum(name.startswith("weight") for name in weights)
 
 
-def _lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array, Array]:
+def _lstm(weights: Weights, x: Single, hidden: Single, cell: Single) -> tuple[Single, Single]:
     """Return the next hidden state and cell (h,) of an LSTM with gates in the order input, forget,
     cell, output.
     """
@@ -49,11 +48,11 @@ def _lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array
     )
     i, f, g, o = np.split(gates, 4)
     cell = _sigmoid(f) * cell + _sigmoid(i) * np.tanh(g)
-    after: Array = _sigmoid(o) * np.tanh(cell)
+    after: Single = _sigmoid(o) * np.tanh(cell)
     return after, cell
 
 
-def _gru(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array, Array]:
+def _gru(weights: Weights, x: Single, hidden: Single, cell: Single) -> tuple[Single, Single]:
     """Return the next hidden state (h,) of a GRU with gates in the order reset, update, new, and
     the unused ``cell``.
     """
@@ -63,7 +62,7 @@ def _gru(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array,
     gates = _sigmoid(entered[: 2 * size] + recurrent[: 2 * size])
     reset, update = gates[:size], gates[size:]
     new = np.tanh(entered[2 * size :] + reset * recurrent[2 * size :])
-    after: Array = new + update * (hidden - new)
+    after: Single = new + update * (hidden - new)
     return after, cell
 
 
@@ -76,8 +75,8 @@ def cell_of(weights: Weights) -> str | None:
     return next((name for name in _CELLS if f"{name}_input" in weights), None)
 
 
-def _sigmoid(x: Array) -> Array:
-    between: Array = (0.5 * (1.0 + np.tanh(0.5 * x))).astype(np.float32)
+def _sigmoid(x: Single) -> Single:
+    between: Single = (0.5 * (1.0 + np.tanh(0.5 * x))).astype(np.float32)
     return between
 
 
@@ -125,7 +124,7 @@ class _Network:
         size = self._memory_size
         self._hidden, self._kept = (np.zeros(size, dtype=np.float32) for _ in range(2))
 
-    def act(self, x: Array) -> Array:
+    def act(self, x: Single) -> Single:
         """Return the action for inputs (n,); a recurrent policy has a memory of earlier inputs."""
         if self._cell is not None:
             _, step = _CELLS[self._cell]
@@ -189,9 +188,7 @@ class TrainedPolicy(_Network):
         self._history = History(self.features, 1)
         self._count, self._held = 0, np.zeros(1, dtype=np.float32)
 
-    def __call__(
-        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
-    ) -> Array:
+    def __call__(self, observation: Floats, info: Mapping[str, Any] | None = None) -> Single:
         """Return the command (1,) m/s for an observation (8,)."""
         if self._count % self._repeat == 0:
             remember = self._history.push if self._count else self._history.restart
@@ -233,11 +230,9 @@ class TaskPolicy(_Network):
     def reset(self) -> None:
         """Forget the last episode."""
         super().reset()
-        self._remembered: Array | None = None
+        self._remembered: Single | None = None
 
-    def __call__(
-        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
-    ) -> Array:
+    def __call__(self, observation: Floats, info: Mapping[str, Any] | None = None) -> Single:
         """Return the action of the task, in its units, for an observation in SI units."""
         seen = (np.asarray(observation) / self._scale).astype(np.float32)
         before = seen if self._remembered is None else self._remembered
@@ -284,11 +279,8 @@ def load_policy(path: str | Path) -> Any:
             f"{file}: not the weights that its card {card_file.name} describes (sha256 differs)"
         )
     check_archive(file, io.BytesIO(data), LIMITS.policy_weights, "weights")
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            weights = {name: np.asarray(arrays[name], dtype=np.float32) for name in arrays.files}
-    except Exception as error:  # any error of a parser on bytes of another kind
-        raise InputError(f"{file}: cannot be read as weights: {error}") from error
+    with reading(file, "weights"), np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        weights = {name: np.asarray(arrays[name], dtype=np.float32) for name in arrays.files}
     bad = [
         name
         for name, array in weights.items()

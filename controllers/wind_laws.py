@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array, Floats
 from ..runtime.errors import InputError
 from .axis_models import tilting
 from .briefing import Briefing, standard_vehicle
@@ -31,8 +31,6 @@ from .wind_observation import (
     WIND_PERIOD,
 )
 
-Array = NDArray[np.floating[Any]]
-Wide = NDArray[np.float64]
 # s, of the attitude loop behind an acceleration that is asked for; upwards there is none
 _ATTITUDE_LAG = FlightGains.rate / FlightGains.attitude * np.array([1.0, 1.0, 0.0])
 
@@ -59,10 +57,10 @@ class _WindLaw:
 
     def reset(self) -> None:
         """Forget the last episode."""
-        self._sum: Wide = np.zeros(3)
-        self._last: dict[str, Wide] = {}
+        self._sum: Array = np.zeros(3)
+        self._last: dict[str, Array] = {}
 
-    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
+    def __call__(self, observation: Floats, info: Mapping[str, Any] | None = None) -> Floats:
         """Return the action (3,) m/s2 for an observation (27,)."""
         o = np.asarray(observation, dtype=np.float64)
         error = o[POSITION_ERROR]
@@ -77,22 +75,22 @@ class _WindLaw:
         wanted = free + self.ki * self._sum
         return np.clip(wanted, -MAX_ACCELERATION, MAX_ACCELERATION).astype(np.float32)
 
-    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+    def against_the_wind(self, o: Array, info: Mapping[str, Any] | None) -> Array:
         """Return the part (3,) m/s2 against the wind; none in this law."""
         return np.zeros(3)
 
-    def _led(self, name: str, value: Wide, lead: float | Wide) -> Wide:
+    def _led(self, name: str, value: Array, lead: float | Array) -> Array:
         """Return ``value + lead dvalue/dt`` by the change of this ``name`` over a decision."""
         last = self._last.get(name, value)
         self._last[name] = value
-        led: Wide = value + lead * ((value - last) / WIND_PERIOD)
+        led: Array = value + lead * ((value - last) / WIND_PERIOD)
         return led
 
-    def _tilting(self, o: Wide, lead: float) -> Wide:
+    def _tilting(self, o: Array, lead: float) -> Array:
         """Return the tilting parts of the estimated torque, led, along x and y, and 0: (3,) Nm."""
         return self._led("torque", np.array([*tilting(o[TORQUE]), 0.0]), lead)
 
-    def _turned(self, o: Wide, lead: float) -> Wide:
+    def _turned(self, o: Array, lead: float) -> Array:
         """Return the acceleration (3,) m/s2 for which the attitude loop makes the angular
         acceleration of the estimated torque, led.
         """
@@ -120,7 +118,7 @@ class PIDWithForce(_WindLaw):
     gain: float = 1.0  # share of the force that is cancelled
     lead: float = 0.0  # s, by which the force's change over a decision is added
 
-    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+    def against_the_wind(self, o: Array, info: Mapping[str, Any] | None) -> Array:
         """Return ``- gain (f + lead df/dt) / m``."""
         return -self.gain / self.vehicle.mass * self._led("force", o[FORCE], self.lead)
 
@@ -136,7 +134,7 @@ class PIDWithWrench(PIDWithForce):
     tilt: float = 10.0
     tilt_lead: float = 0.1  # s, by which the torque's change over a decision is added
 
-    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+    def against_the_wind(self, o: Array, info: Mapping[str, Any] | None) -> Array:
         """Return the force's part, and ``- tilt (tau + tilt_lead dtau/dt)`` across."""
         tilt: float = self.tilt * standard_vehicle().inertia[0, 0] / self.vehicle.inertia[0, 0]
         return super().against_the_wind(o, info) - tilt * self._tilting(o, self.tilt_lead)
@@ -180,9 +178,9 @@ class INDI(_WindLaw):
     def reset(self) -> None:
         """Forget the last episode."""
         super().reset()
-        self._state: Wide | None = None
+        self._state: Array | None = None
 
-    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+    def against_the_wind(self, o: Array, info: Mapping[str, Any] | None) -> Array:
         """Return the low-passed difference of rotor model and accelerometer, less the tilt."""
         from scipy.signal import lfilter, lfilter_zi
 
@@ -229,10 +227,10 @@ class L1Adaptive(_WindLaw):
     def reset(self) -> None:
         """Forget the last episode."""
         super().reset()
-        self._gap: Wide | None = None  # v^ - v
+        self._gap: Array | None = None  # v^ - v
         self._sigma = self._filtered = self._velocity = np.zeros(3)
 
-    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+    def against_the_wind(self, o: Array, info: Mapping[str, Any] | None) -> Array:
         """Advance predictor and adaptation by a decision; return ``-C(s) sigma^``."""
         v, pushed = o[VELOCITY], o[ROTOR_FORCE] - np.array([0.0, 0.0, self.vehicle.gravity])
         turned = self._turned(o, self.tilt_lead)

@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.arrays import Array
 from .briefing import Air, FilterNoise
-
-Array = NDArray[np.float64]
 
 ORDER = 3  # the autoregression's
 

@@ -167,8 +167,8 @@ class Story:
                     f"The same {count} episodes, with the declared model and with the amended "
                     "one. Fan, gusts and noise are the same.",
                     f"Distance from the jet's axis, mean RMSE: {before.mean():.3f} m before, "
-                    f"{after.mean():.3f} m after; smaller on {np.sum(after < before)} of {count}.",
-                    "So few flights show a direction, no rate.",
+                    f"{after.mean():.3f} m after; smaller in {np.sum(after < before)} of {count}.",
+                    "Too few episodes for a success rate.",
                 ),
                 f"windwrench fly --scenario {SCENARIO} --seed {self.seed} --vehicle "
                 f"{self.out / 'diagnose' / 'vehicle.yaml'} --truth "

@@ -348,7 +348,7 @@ class Vehicle:
 
     def commanded_thrust(self, command: Array, voltage: Array | None = None) -> Array:
         """Return the static thrust (N, 4) in N of motor commands (N, 4), 0 to 1, by the vehicle's
-        motor curve; ``voltage`` (N,) in V, default: the curve's.
+        motor curve; ``voltage`` (N,) in V, default: the curve's. A motor at command 0 stands still.
 
         Raises:
             InputError: the vehicle states no motor curve.
@@ -362,7 +362,7 @@ class Vehicle:
         if voltage is not None and self.voltage_ref > 0.0:
             exponent = self.motor_curve.voltage_exponent
             thrust = thrust * np.power(voltage / self.voltage_ref, exponent)[:, None]
-        return np.maximum(np.asarray(thrust, np.float64), 0.0)
+        return np.maximum(thrust, 0.0) * (command > 0.0)
 
     def commanded_speeds(self, command: Array, voltage: Array | None = None) -> Array:
         """Return the rotor speeds (N, 4) in rad/s whose thrust is ``commanded_thrust``."""

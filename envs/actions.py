@@ -14,8 +14,8 @@ from ..controllers.flight import (
     ROTORS,
     FlightGains,
 )
-from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array
 from ..runtime.errors import unknown_name
 
 ACTIONS = ("velocity", "acceleration", "attitude", "rates", "rotors")

@@ -5,8 +5,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.arrays import Array, Picture
 from .scene_shapes import ESTIMATED, TRUE, TURNING, TURNING_TRUE
 from .task import Task
 
@@ -27,7 +27,7 @@ def _font(size: int, bold: bool) -> Any:
     return ImageFont.truetype(f"{get_data_path()}/fonts/ttf/{name}", size)
 
 
-def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> NDArray[np.uint8]:
+def captioned(env: Task, title: str, flown: Sequence[Mapping[str, Any]]) -> Picture:
     """Return a task's picture (height, width, 3) with its caption.
 
     Args:
@@ -103,7 +103,7 @@ def _short(value: float) -> str:
     return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
 
 
-def _newtons(force: NDArray[np.float64]) -> str:
+def _newtons(force: Array) -> str:
     return f"{np.linalg.norm(force):.2f} N"
 
 

@@ -32,12 +32,12 @@ from ..dynamics.effects import compile_effects
 from ..dynamics.effects.own import raise_errors
 from ..dynamics.mean_jet import COUNT_R, COUNT_X, jet_table
 from ..dynamics.model import lay_addresses, without_addresses
-from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
 from ..estimator.constant_gain import ConstantGainFilter
 from ..estimator.tuning import UKFTuning
 from ..estimator.ukf import WrenchUKF
+from ..runtime.arrays import Array
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, STATIONS, Fan, fan_record
 from .plant import (

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from ..controllers.briefing import Briefing
 from ..controllers.flight import FlightGains
 from ..dynamics.effects import check_setting
-from ..dynamics.motion import Array
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
+from ..runtime.arrays import Array, Mask, Single
 from ..runtime.errors import InputError, unknown_name
 from .actions import UNITS, make_action
 from .closed_loop import ESTIMATORS, ClosedLoop, Stage
@@ -25,7 +25,7 @@ from .observations import FELT, as_numbers, bounds, parts
 from .plant import TICK, PlantSettings
 from .references import along
 from .scenarios import Drawn, draw_vehicle, find_scenario
-from .state import REFERENCE_SIZE, Episodes, Flags, Frame, Start, State
+from .state import REFERENCE_SIZE, Episodes, Start, State
 from .wind import Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_winds
 
@@ -56,13 +56,13 @@ class TaskDefinition:
     accelerometer: ClassVar[tuple[float, float] | None] = ACCELEROMETER
     label: ClassVar[str] = "trajectory"  # entry of ``info`` with the name of the episode's draw
     draws: ClassVar[int] = 20  # at most, until an episode begins with the vehicle not lost
-    mixes: ClassVar[bool] = False  # whether episodes differ in what lanes share
+    mixes: bool = False  # whether episodes differ in what lanes share
     _made: ClosedLoop | None = None  # last of all loops, whose MuJoCo model the next one may take
     limits: Any = None  # (k,) largest sizes of the observation's numbers
     scales: Any = None  # (k,) their divisors, with ``normalize``
     fan: Fan
-    action_space: gym.Space[Frame]
-    observation_space: gym.Space[Frame]
+    action_space: gym.Space[Single]
+    observation_space: gym.Space[Single]
 
     def __init__(
         self,
@@ -233,7 +233,7 @@ class TaskDefinition:
         ratio = s.distance / TRACKING_WIDTH
         return {"tracking": 1.0 / (1.0 + ratio * ratio)}
 
-    def is_lost(self, s: State) -> Flags:
+    def is_lost(self, s: State) -> Mask:
         """Return whether each vehicle is lost (n,), which terminates its episode.
 
         Here: 2.5 m from the reference, on the floor, tilted by 70 degrees, or not finite.

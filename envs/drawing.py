@@ -8,16 +8,14 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
+from ..runtime.arrays import Array, Picture
 from ..runtime.errors import InputError
 from .closed_loop import ClosedLoop
 from .display import need_display
 from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
 from .wind import FanWall
-
-Array = NDArray[np.float64]
 
 # degrees of a picture of 4:3 from top to bottom; a wider one shows less there
 _FIELD = 48.0
@@ -92,7 +90,7 @@ class Viewer:
                 "install Debian's libegl1 or libosmesa6"
             ) from error
 
-    def draw(self, loop: ClosedLoop, goal: Array | None = None) -> NDArray[np.uint8] | None:
+    def draw(self, loop: ClosedLoop, goal: Array | None = None) -> Picture | None:
         """Draw the loop as it is now, in the wind with its ``goal`` (3,) m; return the picture
         (height, width, 3), or None from a window.
         """
@@ -117,7 +115,7 @@ class Viewer:
             return None
         self._renderer.update_scene(loop.data, camera="chase")
         self._mark(self._renderer.scene, loop, air, goal)
-        picture: NDArray[np.uint8] = self._renderer.render()
+        picture: Picture = self._renderer.render()
         return picture
 
     def _mark(self, scene: Any, loop: ClosedLoop, air: Array, goal: Array | None) -> None:

@@ -8,14 +8,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from ..controllers.briefing import standard_vehicle
 from ..dynamics.mean_jet import HULL_RADIUS, HULL_STATIONS
 from ..dynamics.vehicle import Vehicle
-
-Array = NDArray[np.float64]
+from ..runtime.arrays import Array
 
 STATIONS = 4 + HULL_STATIONS  # points of drag: four rotors and a ring on the hull
 
@@ -81,11 +79,9 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
         f[name] = getattr(fan, name)
     f["keep"] = math.exp(-period / fan.gust_time)
     angle = np.arange(8) * math.pi / 4
-    ring = fan.hull_radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)
-    if fan.hull_elevation != 0.0:
-        above = fan.hull_elevation * (-1.0) ** np.arange(8)
-        ring[:, :2] *= np.cos(above)[:, None]
-        ring[:, 2] = fan.hull_radius * np.sin(above)
+    above = fan.hull_elevation * (-1.0) ** np.arange(8)
+    ring = fan.hull_radius * np.stack([np.cos(angle), np.sin(angle), np.sin(above)], axis=1)
+    ring[:, :2] *= np.cos(above)[:, None]
     stations = np.concatenate([rotor_positions, ring])
     f["stations"] = stations
     distance = np.linalg.norm(stations[:, None] - stations[None], axis=2)

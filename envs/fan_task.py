@@ -1,6 +1,7 @@
 """The base of the tasks in front of a fan."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from ..controllers.briefing import Air, Briefing, FilterNoise, Jet, Motions
 from ..controllers.observation import MAX_COMMAND
-from ..dynamics.motion import Array
+from ..runtime.arrays import Array
 from .fan import Fan
 from .plant import TICK, PlantSettings
 from .scenarios import SCENARIOS
@@ -30,7 +31,7 @@ class FanTask(Task):
     agent moves across its jet along ``axes``.
     """
 
-    scenarios = SCENARIOS
+    scenarios: ClassVar[Mapping[str, Any]] = SCENARIOS
     action, observation, decision_hz, normalize = "velocity", "own", 12.5, False
     follows, model_in_loop = False, False
     accelerometer: ClassVar[tuple[float, float] | None] = None

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from ..controllers.observation import MAX_COMMAND
-from ..dynamics.motion import Array
+from ..runtime.arrays import Array, Mask
 from ..runtime.errors import InputError, unknown_name
 from .definition import LOST_OFFSET
 from .fan import Fan
 from .fan_task import AWAY, LIMITS, SCALES, FanTask
 from .scenarios import draw_fan_path
-from .state import Flags, State
+from .state import State
 
 FRAMES = 25  # decisions of a history, 2 s
 # for the pose: position (m), velocity (m/s), tilt, yaw (rad), command (m/s)
@@ -178,7 +178,7 @@ class FanTrackingEnv(FanTask):
             return np.concatenate([moved, frame[:, 6:7], turned, frame[:, 7:]], axis=1)
         return frame[:, 1:] if self.view == "wrench-without-fx" else frame
 
-    def is_lost(self, s: State) -> Flags:
+    def is_lost(self, s: State) -> Mask:
         """Return whether each vehicle is lost (n,)."""
         away = np.abs(s.position - s.reference[:, :3])
         near = (away[:, 0] <= AWAY) & (away[:, 2] <= AWAY)

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.motion import Array
+from ..runtime.arrays import Array, Mask
 from .definition import LOST_OFFSET
 from .fan import Fan
 from .fan_task import AWAY, LIMITS, SCALES, FanTask
 from .scenarios import draw_fan_path
-from .state import Flags, State
+from .state import State
 
 FAN_HEIGHT = 1.5  # m, of the fan's axis at the start
 CAGE = 0.6  # rad, of the cage's stations above and below the rotors' plane
@@ -91,11 +91,11 @@ class FanTracking2DEnv(FanTask):
         """Return the vehicles' offsets (n, 2) m."""
         return s.position[:, 1:] - s.fan
 
-    def is_lost(self, s: State) -> Flags:
+    def is_lost(self, s: State) -> Mask:
         """Return whether each vehicle is lost (n,)."""
         near = np.abs(s.position[:, 0] - s.reference[:, 0]) <= AWAY
         error = np.hypot(*self.off_axis(s).T)
-        lost: Flags = ~(s.flying & near & (s.position[:, 2] > 0.0) & (error <= LOST_OFFSET))
+        lost: Mask = ~(s.flying & near & (s.position[:, 2] > 0.0) & (error <= LOST_OFFSET))
         return lost
 
     def info(self, s: State) -> dict[str, Any]:

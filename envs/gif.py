@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.arrays import Picture
 from ..runtime.whole_files import replaced
 from .scene_shapes import MARKS
 
@@ -14,7 +14,7 @@ _SAMPLES = 6  # pictures from which colours are chosen
 _SHADES, _DARKEST = 4, 0.4  # shades of a mark's colour in the light, and the darkest one's share
 
 
-def write_gif(pictures: Sequence[NDArray[np.uint8]], fps: float, path: Path) -> None:
+def write_gif(pictures: Sequence[Picture], fps: float, path: Path) -> None:
     """Write pictures (height, width, 3) as a GIF, whole or not at all.
 
     All share the same few colours: these neither flicker nor cost space in every picture.

@@ -1,10 +1,10 @@
 """Observations of all tasks: pose and twist, the felt wrench, the accelerometer."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array, Single
 from ..runtime.errors import unknown_name
 from .state import State
 
@@ -54,6 +54,6 @@ def bounds(name: str, vehicle: Vehicle, actions: int) -> tuple[list[float], list
     return limits + [1.0] * actions, scales + [1.0] * actions
 
 
-def as_numbers(values: ArrayLike) -> NDArray[np.float32]:
+def as_numbers(values: ArrayLike) -> Single:
     """Return numbers in single precision."""
     return np.array(values, dtype=np.float32)

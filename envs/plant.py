@@ -21,16 +21,15 @@ from ..dynamics.model import (
     load_model,
     reset_model,
 )
-from ..dynamics.motion import Array
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array
 from ..runtime.errors import InputError
 from .fan import STATIONS
 
 TICK = 0.005  # s
 SUBSTEPS = 2
 # unit normals that one tick uses: pose, disturbance, gusts, dropout
-_POSE, _DISTURBANCE, _GUSTS, _DROPOUT = 0, 6, 12, 12 + 3 * STATIONS
-NOISE = _DROPOUT + 1
+NOISE = 6 + 6 + 3 * STATIONS + 1
 MAX_DELAY = 0.1  # s, of what is kept for later
 _KEPT = round(MAX_DELAY / TICK) + 1
 

@@ -5,16 +5,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.vehicle import EffectSetting, Vehicle
+from ..runtime.arrays import Array
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ClosedLoop
 from .fan import Fan
 from .plant import NOISE, TICK, PlantSettings
 
-Array = NDArray[np.float64]
 _RAMP = 2.0  # s, over which a trajectory fades in
 _REPORTED = 4_000  # ticks between two reports of progress
 _REACH = 1.5  # m, to either side of a fan's axis

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ..dynamics.motion import Array
+from ..runtime.arrays import Array
 from .plant import TICK
 
 REFERENCE_FADE = 1.5  # s, over which a moving reference gets up to speed

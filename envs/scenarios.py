@@ -6,17 +6,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from ..controllers.briefing import PLACES
 from ..dynamics.vehicle import NotNegative, Vehicle
+from ..runtime.arrays import Array
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.forms import STRICT, Positive, checked, expected
 from ..runtime.python_file import is_file_name, named_in_file
 from ..runtime.yaml_file import read_yaml
 
-Array = NDArray[np.float64]
 AnyScenario = TypeVar("AnyScenario")
 _YAML = (".yaml", ".yml")
 

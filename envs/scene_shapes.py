@@ -6,9 +6,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..runtime.arrays import Array
 
 # true: wide and light; estimated: narrow and dark
 ESTIMATED, TRUE = np.array([0.80, 0.08, 0.06, 1.0]), np.array([0.25, 0.72, 0.35, 1.0])

@@ -4,13 +4,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
-
-Frame = NDArray[np.float32]
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from ..runtime.arrays import Array, Index, Mask
 
 REFERENCE_SIZE = 10  # position, velocity, acceleration, yaw
 
@@ -37,15 +33,15 @@ class Start(NamedTuple):
 class Episodes(NamedTuple):
     """Episodes side by side, a row each."""
 
-    ticks: NDArray[np.int64]  # (n,) since the start; below zero while the filter settles
-    decisions: NDArray[np.int64]  # (n,) likewise
+    ticks: Index  # (n,) since the start; below zero while the filter settles
+    decisions: Index  # (n,) likewise
     paths: Array  # (n, m) m, y of the fan's axis, a column a tick
     heights: Array  # (n, m) m, its height; (n, 1) if no fan moves up or down
     references: Array  # (n, k, 10), a row a tick
     commands: Array  # (n, actions) as the flight loop takes them
     actions: Array  # (n, actions) as the agent gave them, -1 to 1
     last_actions: Array  # (n, actions)
-    broken: Flags  # (n,) whether the physics started over on its own
+    broken: Mask  # (n,) whether the physics started over on its own
 
     @classmethod
     def zeros(cls, count: int, actions: int) -> "Episodes":
@@ -80,7 +76,6 @@ _BESIDE = {
     "change": 1,
 }
 _FIRST = sum(_TRUE.values())  # column of the estimate
-_STD = _FIRST + 20
 _REST = _FIRST + sum(_ESTIMATED.values())
 _SIZE = _REST + sum(_BESIDE.values())
 assert _SIZE == _core.WORLD_SIZE, "the core was built for another layout"

@@ -4,21 +4,19 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
-from ..dynamics.motion import Array
+from ..runtime.arrays import Array, Picture, Single
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ClosedLoop
 from .definition import TaskDefinition
 from .lanes.vector import TaskLanes
-from .state import Frame
 from .truth import true_motion
 from .vector import JudgedStep, TaskVectorEnv
 
 PLANTS: dict[str, type[TaskVectorEnv]] = {"mujoco": TaskVectorEnv, "lanes": TaskLanes}
 
 
-class Task(TaskDefinition, gym.Env[Frame, Frame]):
+class Task(TaskDefinition, gym.Env[Single, Single]):
     """The base class of tasks: a quadrotor whose agent commands the flight loop.
 
     A subclass overrides class attributes and up to five functions of arrays with a row for each
@@ -114,7 +112,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Frame, dict[str, Any]]:
+    ) -> tuple[Single, dict[str, Any]]:
         """Start an episode; the same seed gives the same episode, bit for bit.
 
         Raises:
@@ -129,7 +127,7 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         judged = self.many.begin(self.np_random)
         return judged.observations[0].copy(), self._info_with_truth(judged)
 
-    def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Single) -> tuple[Single, float, bool, bool, dict[str, Any]]:
         """Fly a decision with an action of ``action_space``, clipped to its range.
 
         Raises:
@@ -156,13 +154,13 @@ class Task(TaskDefinition, gym.Env[Frame, Frame]):
         speeds, integral = record["plant"]["speeds"], record["flight"]["sum"]
         return true_motion(self.vehicle, world.qpos, world.qvel, speeds, integral)
 
-    def render(self) -> NDArray[np.uint8] | None:
+    def render(self) -> Picture | None:
         """Return a picture (height, width, 3) of vehicle, wind and wrench, or show it in a window.
 
         Raises:
             InputError: not reset yet, or this machine cannot draw.
         """
-        picture: NDArray[np.uint8] | None = self.many.render()[0]
+        picture: Picture | None = self.many.render()[0]
         return picture
 
     def close(self) -> None:

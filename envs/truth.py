@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.motion import Array
 from ..dynamics.rotation import matrix_of
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array
 
 
 def true_motion(

@@ -13,11 +13,11 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from .. import _core
-from ..dynamics.motion import Array
+from ..runtime.arrays import Array, Mask, Single
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ClosedLoop
 from .definition import TaskDefinition
-from .state import Episodes, Flags, Frame, Start, State
+from .state import Episodes, Start, State
 from .untimed import Untimed
 
 Infos = dict[str, Any]
@@ -28,13 +28,13 @@ SETTLE_TICKS = 300  # the filter settles before an episode starts
 class JudgedStep(NamedTuple):
     """A task's answer to the state of n worlds."""
 
-    observations: Frame  # (n, k) as the agent sees them
+    observations: Single  # (n, k) as the agent sees them
     rewards: Array  # (n,)
-    lost: Flags  # (n,)
+    lost: Mask  # (n,)
     values: Infos  # entries of ``info``, (n, ...)
 
 
-class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
+class TaskVectorEnv(gym.vector.VectorEnv[Single, Single, NDArray[Any]]):
     """``num_envs`` environments side by side, each bit for bit the single one with its seed.
 
     ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. After an episode the
@@ -131,7 +131,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         *,
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[Frame, Infos]:
+    ) -> tuple[Single, Infos]:
         """Start an episode in every environment, or in those of ``options["reset_mask"]``
         (num_envs,), booleans.
 
@@ -158,7 +158,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         judged = self._judge()
         return judged.observations.copy(), self._infos(judged, self._all)
 
-    def step(self, actions: Frame) -> tuple[Frame, NDArray[np.float64], Flags, Flags, Infos]:
+    def step(self, actions: Single) -> tuple[Single, Array, Mask, Mask, Infos]:
         """Fly a decision in every environment with actions (num_envs, n) of ``action_space``.
 
         Raises:
@@ -210,11 +210,11 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         return self._judge()
 
     @property
-    def truncated(self) -> Flags:
+    def truncated(self) -> Mask:
         """Whether each episode (n,) has had its last decision."""
         return self.episodes.decisions >= self.max_episode_steps
 
-    def fly(self, actions: Any, which: Flags) -> None:
+    def fly(self, actions: Any, which: Mask) -> None:
         """Fly a decision in some environments with actions (num_envs, n).
 
         Raises:
@@ -230,7 +230,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._fresh[which] = False
         self._some_fresh = which is not self._all and bool(self._fresh.any())
 
-    def _taken(self, actions: Any, which: Flags) -> bool:
+    def _taken(self, actions: Any, which: Mask) -> bool:
         """Return whether actions (num_envs, n) are finite and of the right shape. If so, write
         down the actions of ``which``.
         """
@@ -267,7 +267,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
             self.render()
         return JudgedStep(self._frames, rewards, lost, values)
 
-    def _start(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
+    def _start(self, which: Mask, seeds: Sequence[int | None] | None = None) -> None:
         """Start an episode in the environments of ``which`` (num_envs,)."""
         self._begun[which] = False
         self._fresh[which] = True
@@ -342,7 +342,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         )
         self._see(which)
 
-    def _fly(self, which: Flags) -> None:
+    def _fly(self, which: Mask) -> None:
         """Fly a decision in some environments at their commands."""
         flying = [0] if self.num_envs == 1 else np.flatnonzero(which).tolist()
         with Untimed():
@@ -387,7 +387,7 @@ class TaskVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         for each in working:
             each.result()
 
-    def _infos(self, judged: JudgedStep, which: Flags) -> Infos:
+    def _infos(self, judged: JudgedStep, which: Mask) -> Infos:
         """Return the ``infos`` of some environments as Gymnasium's vector environments do: an array
         and a mask for each entry; zeros, or None, outside the mask.
         """

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..dynamics.motion import Array
 from ..dynamics.vehicle import NotNegative
+from ..runtime.arrays import Array
 from .references import figure_of_eight, hold, random_spline
 from .scenarios import Drawn, Factors, Range, ScenarioBase, kept_scenarios
 from .wind import (

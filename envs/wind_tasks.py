@@ -4,7 +4,6 @@ import math
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from ..controllers.wind_observation import (
@@ -13,6 +12,7 @@ from ..controllers.wind_observation import (
     OBSERVATION_SCALES,
 )
 from ..dynamics.rotation import matrix_of
+from ..runtime.arrays import Array
 from .plant import TICK
 from .state import Start, State
 from .task import Task
@@ -120,7 +120,7 @@ class WindHoverEnv(Task):
         labels, references = zip(*drawn, strict=True)
         return Start(np.tile([*START, math.pi], (n, 1)), references, winds, labels=labels)
 
-    def observe(self, s: State) -> NDArray[np.float64]:
+    def observe(self, s: State) -> Array:
         """Return the task's own observation (n, 27)."""
         e, r = s.estimate, s.reference
         moved = [r[:, :3] - e.position, e.velocity, r[:, 3:9]]

@@ -1,7 +1,8 @@
 """The benchmark of all tasks: controllers flown through the same episodes."""
 
+import itertools
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..controllers.registry import STANDARD_TASK
@@ -89,35 +90,28 @@ def fly_all(
         InputError: as ``Request.check``.
     """
     wanted = request.check().references(request.controllers)
-    worlds, episodes = dict.fromkeys(request.scenarios), request.episodes
-    seeds = tuple(benchmark_seeds(request.seed, episodes))
-    chunks = [
-        (request, controller, scenario, seeds[i : i + _CHUNK])
-        for scenario in worlds
+    seeds = tuple(benchmark_seeds(request.seed, request.episodes))
+    starts = 0, *range(1, request.episodes, _CHUNK)  # one episode first, for an early count
+    chunks: list[Chunk] = [
+        (request, controller, scenario, seeds[first:end])
+        for scenario in dict.fromkeys(request.scenarios)
         for controller in wanted
-        for i in range(0, episodes, _CHUNK)
+        for first, end in itertools.pairwise((*starts, request.episodes))
     ]
-    # one episode first, for an early count
-    first = chunks[0]
-    chunks[:1] = [(*first[:3], part) for part in (first[3][:1], first[3][1:]) if part]
+    jobs = min(jobs or os.cpu_count() or 1, len(chunks))
     flown: dict[Chunk, list[Episode]] = {}
-    for chunk, some in _flown(chunks, jobs, cluster):
+    alone = jobs == 1 and cluster is None
+    for chunk, some in (
+        ((chunk, _fly_chunk(chunk)) for chunk in chunks)
+        if alone
+        else every(_fly_chunk, chunks, None if cluster else jobs, cluster)
+    ):
         flown[chunk] = some
         advance(len(some))
-    results: Results = {(name, scenario): [] for scenario in worlds for name in wanted}
+    results: Results = {}
     for chunk in chunks:
-        results[chunk[1], chunk[2]].extend(flown[chunk])
+        results.setdefault(chunk[1:3], []).extend(flown[chunk])
     return results
-
-
-def _flown(
-    chunks: list[Chunk], jobs: int | None, cluster: str | None
-) -> Iterable[tuple[Chunk, list[Episode]]]:
-    """Yield each chunk with its episodes, as they come."""
-    jobs = min(jobs or os.cpu_count() or 1, len(chunks))
-    if jobs == 1 and cluster is None:
-        return ((chunk, _fly_chunk(chunk)) for chunk in chunks)
-    return every(_fly_chunk, chunks, None if cluster else jobs, cluster)
 
 
 def _fly_chunk(chunk: Chunk) -> list[Episode]:

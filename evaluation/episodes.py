@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..envs.definition import LOST_OFFSET
 from ..envs.fan_tracking import FanTrackingEnv
+from ..runtime.arrays import Array
 from ..runtime.errors import InputError
 from .watched import WatchedInfo
 
-Array = NDArray[np.float64]
 DECISIONS = FanTrackingEnv.decisions()
 # Seeds of scored episodes; training and validation use seeds below, and share none.
 FIRST_TEST_SEED = 1_000_000

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..controllers.registry import STANDARD_TASK
+from ..runtime.arrays import Array
 from .benchmark import Results
 from .episodes import Episode
 from .statistics import (
@@ -113,12 +113,22 @@ def leaderboard(
 Flown = Mapping[str, Sequence[Sequence[Episode]]]
 
 
-def figures(flown: Sequence[Sequence[Episode]], name: str) -> NDArray[np.float64]:
+def flights_of(row: Standing, results: Results) -> list[list[Episode]]:
+    """Return the episodes of each policy in a row."""
+    return [
+        flown
+        for (name, scenario), flown in results.items()
+        if scenario == row.scenario
+        and (name if row.policies == 1 else name.rpartition("-")[0]) == row.controller
+    ]
+
+
+def figures(flown: Sequence[Sequence[Episode]], name: str) -> Array:
     """Return a property of all episodes (policies, episodes)."""
     return np.array([[getattr(e, name) for e in one] for one in flown], dtype=np.float64)
 
 
-def ranking_figures(flown: Flown) -> tuple[str, dict[str, NDArray[np.float64]]]:
+def ranking_figures(flown: Flown) -> tuple[str, dict[str, Array]]:
     """Return the name of the ranking figure, and its values by controller (policies, episodes);
     less is better.
     """
@@ -142,6 +152,9 @@ def _row(task: str, scenario: str, seed: int, name: str, flown: Flown) -> Standi
     wins = float(paired_wins(x, ranked[rival]))
     lost = figures(episodes, "lost")
 
+    def average(figure: str) -> float:
+        return float(figures(episodes, figure).mean())
+
     def change(law: str) -> tuple[float, tuple[float, float], float | None]:
         if by == RETURN:
             return math.nan, _NONE, None
@@ -150,7 +163,7 @@ def _row(task: str, scenario: str, seed: int, name: str, flown: Flown) -> Standi
         return float(relative_change(x, ranked[law])), interval_of(draws), p
 
     def in_metres(
-        statistic: Callable[..., Any], values: NDArray[np.float64]
+        statistic: Callable[..., Any], values: Array
     ) -> tuple[float, tuple[float, float]]:
         if by == RETURN:
             return math.nan, _NONE
@@ -192,16 +205,16 @@ def _row(task: str, scenario: str, seed: int, name: str, flown: Flown) -> Standi
         ranked_by=by,
         rmse_settled_m=settled,
         rmse_settled_ci95_m=settled_ci,
-        rmse_transient_m=float(figures(episodes, "rmse_transient").mean()),
+        rmse_transient_m=average("rmse_transient"),
         iqm_rmse_m=iqm,
         iqm_ci95_m=iqm_ci,
         improvement_ci95=better,
         return_mean=float(returns.mean()),
         return_ci95=interval(mean, returns, resamples=_RESAMPLES),
-        command_activity=float(figures(episodes, "command_activity").mean()),
-        saturated_fraction=float(figures(episodes, "saturated_fraction").mean()),
+        command_activity=average("command_activity"),
+        saturated_fraction=average("saturated_fraction"),
         lost_episodes=int(lost.sum()),
-        uses_truth=bool(figures(episodes, "uses_truth").any()),
+        uses_truth=average("uses_truth") > 0.0,
     )
 
 

@@ -21,7 +21,7 @@ from ..runtime.drawing import (
 from ..runtime.page_files import write_png
 from .benchmark import Results
 from .episodes import Episode
-from .leaderboard import SETTLED, Standing, figures, shown
+from .leaderboard import SETTLED, Standing, figures, flights_of, shown
 from .tables import in_mm
 from .tasks import short_names
 
@@ -107,11 +107,7 @@ def draw_leaderboard(rows: Sequence[Standing], results: Results, path: Path) -> 
         figure_name = "rmse_settled" if by_error else "total_reward"
         middle = int(np.argsort(figures([rival], figure_name)[0])[len(rival) // 2])
         for i, row in enumerate(some):
-            flown = [
-                each
-                for name, each in flights.items()
-                if (name if row.policies == 1 else name.rpartition("-")[0]) == row.controller
-            ]
+            flown = flights_of(row, results)
             values = figures(flown, figure_name).ravel()
             shown_mean = row.rmse_settled_m if by_error else row.return_mean
             mean_text = f"{in_mm(shown_mean)} mm" if by_error else f"{shown_mean:.4g}"

@@ -12,12 +12,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import bootstrap, trim_mean
 
+from ..runtime.arrays import Array
 from ..runtime.errors import InputError
 
-Array = NDArray[np.float64]
 _RESAMPLES = 2_000
 _LEVEL = 0.95  # probability of an interval
 _AT_ONCE = 1_000_000  # numbers per draw

@@ -8,7 +8,6 @@ import os
 import platform
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +15,16 @@ import numpy as np
 
 from .. import __version__
 from ..runtime.page_files import write_text
+from ..runtime.plain_values import plain
 from ..runtime.provenance import commit, package_versions
 from .benchmark import Request, Results
-from .leaderboard import SETTLED, Standing, figures, ranking_figures
+from .leaderboard import SETTLED, Standing, figures, flights_of, ranking_figures
 from .statistics import (
     hierarchical_draws,
     interquartile_mean,
     interval_of,
     probability_of_improvement,
 )
-from .tables import rows_of
 from .tasks import task_of
 
 _FIGURES = ("rmse_settled", "rmse_transient", "total_reward", "lost", "uses_truth")
@@ -39,32 +38,30 @@ def over_all(rows: Sequence[Standing], results: Results) -> list[dict[str, Any]]
     rliable's; the bootstrap is stratified by scenario, over policies and episodes.
     """
     flown_task, over_all_rows = task_of(rows[0].task), []
-    policies = {row.controller: row.policies for row in rows}
-    worlds = list(dict.fromkeys(row.scenario for row in rows))
-    for name in policies:
-        kin = [one for one, _ in results if one.rpartition("-")[0] == name]
-        policies_of_kind = list(dict.fromkeys(kin)) if policies[name] > 1 else [name]
+    of_controller: dict[str, list[Standing]] = {}
+    for row in rows:
+        of_controller.setdefault(row.controller, []).append(row)
+    for name, in_worlds in of_controller.items():
         scores, better = [], []
-        for world in worlds:
-            laws = {name: policies_of_kind} | {law: [law] for law in flown_task.references(())}
-            flown = {law: [results[each, world] for each in some] for law, some in laws.items()}
-            by, ranked = ranking_figures(flown)
+        for row in in_worlds:
+            laws = {law: [results[law, row.scenario]] for law in flown_task.references(())}
+            by, ranked = ranking_figures({name: flights_of(row, results)} | laws)
             start, end = ranked["hover"].mean(), ranked.get("oracle", np.array(np.nan)).mean()
             scores.append((start - ranked[name]) / (start - end))
             better.append((-ranked[name], -ranked[flown_task.rival]))
         strata = [each.shape[1] for each in scores]
         x, y = (np.hstack(part) for part in zip(*better, strict=True))
         draws = hierarchical_draws(probability_of_improvement, x, y, strata=strata)
-        row = {
+        stated: dict[str, Any] = {
             "controller": name,
-            "improvement_over_rival": float(probability_of_improvement(x, y)),
+            "improvement_over_rival": probability_of_improvement(x, y),
             "improvement_ci95": interval_of(draws),
         }
         if by == SETTLED and np.isfinite(scores[0]).all():
             score = np.hstack(scores)
             draws = hierarchical_draws(interquartile_mean, score, strata=strata)
-            row |= {"iqm_score": float(interquartile_mean(score)), "iqm_ci95": interval_of(draws)}
-        over_all_rows.append(row)
+            stated |= {"iqm_score": interquartile_mean(score), "iqm_ci95": interval_of(draws)}
+        over_all_rows.append(stated)
     return over_all_rows
 
 
@@ -84,10 +81,7 @@ def write_submission(
             "controller": name,
             "scenario": scenario,
             "seeds": [episode.seed for episode in flown],
-            **{
-                key: [None if value != value else value for value in figures([flown], key)[0]]
-                for key in _FIGURES
-            },
+            **{key: figures([flown], key)[0] for key in _FIGURES},
         }
         for (name, scenario), flown in results.items()
     ]
@@ -103,13 +97,13 @@ def write_submission(
             for name in sorted({*files, *request.imports})
             if os.path.isfile(name)
         },
-        "request": asdict(request),
-        "rows": rows_of(rows),
+        "request": request,
+        "rows": rows,
         "over_all": over_all(rows, results),
         "flights": flights,
     }
     path = folder / "submission.json"
-    data = json.loads(json.dumps({**data, "sha256": ""}))
+    data = plain(data)
     data["sha256"] = results_hash(data)
     write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", path)
     return path

@@ -3,26 +3,14 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from ..runtime.page_files import write_text
+from ..runtime.plain_values import plain
 from .leaderboard import SETTLED, Standing, shown
 from .tasks import short_names, task_of
 
 _CLEAR = 0.05  # p-value, corrected
-
-
-def rows_of(rows: Sequence[Standing]) -> list[dict[str, Any]]:
-    """Return the rows as plain values; a number without a meaning is None."""
-    return [{key: _plain(value) for key, value in asdict(row).items()} for row in rows]
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_plain(each) for each in value]
-    return None if value != value else value
 
 
 def write_leaderboard(rows: Sequence[Standing], folder: Path) -> Path:
@@ -31,7 +19,7 @@ def write_leaderboard(rows: Sequence[Standing], folder: Path) -> Path:
     A number without a meaning is null.
     """
     path = folder / "leaderboard.json"
-    write_text(json.dumps(rows_of(rows), indent=1, allow_nan=False) + "\n", path)
+    write_text(json.dumps(plain(rows), indent=1, allow_nan=False) + "\n", path)
     return path
 
 
@@ -162,8 +150,9 @@ def legend(task: str, rows: Sequence[Standing]) -> str:
         f"{task}: {first.episodes} paired episodes per scenario, seed {first.seed}.": True,
         f"Ranked by {ranked}.": True,
         "IQM: interquartile mean.": by_error,
-        "Activity: mean squared change of the command, of its largest.": True,
-        f"P: probability of improvement over {flown_task.rival} (0 % of the way to limit).": True,
+        "Activity: mean squared change of the command (largest command: 1).": True,
+        f"P: probability of improvement over {flown_task.rival}.": True,
+        f"To the limit: {flown_task.rival} 0 %, limit 100 %.": not math.isnan(first.share_of_limit),
         "Score: 0 = hover, 1 = oracle.": "oracle" in flown_task.laws,
         "A terminated episode's rest counts 2.5 m.": any(row.lost_episodes for row in rows),
         "*: reads the truth or a preview.": any(row.uses_truth for row in rows),

@@ -115,8 +115,8 @@ class BenchmarkTask:
             **given: other arguments of the environment; None: not given.
 
         Raises:
-            InputError: as ``scenario`` and ``find_reward``, or the environment takes no such
-                argument.
+            InputError: as ``scenario`` and ``find_reward``, the environment takes no such argument,
+                or its actions are no box.
         """
         given = {name: value for name, value in given.items() if value is not None}
         if self.scenarios:
@@ -129,6 +129,11 @@ class BenchmarkTask:
                 env = gym.make(self.spec, disable_env_checker=True, **units, **given)
             except TypeError as error:
                 raise InputError(f"{self.name}: cannot be made: {error}") from error
+            if not isinstance(env.action_space, gym.spaces.Box):
+                raise InputError(
+                    f"{self.name}: expected actions in a Box, got {env.action_space}: control laws "
+                    "command real numbers"
+                )
         return env if reward is None else OwnReward(env, find_reward(reward))
 
     def make_many(self, count: int, scenario: str, **given: Any) -> gym.vector.VectorEnv:
@@ -143,10 +148,12 @@ class BenchmarkTask:
         if self.scenarios:
             given["scenario"] = self.scenario(scenario)
         if self.kin or self.spec is None:
-            given["normalize"] = True
-        spec = self.spec or gym.spec(f"windwrench/{self.name}-v1")
-        mode = "sync" if spec.vector_entry_point is None else "vector_entry_point"
-        return gym.make_vec(spec, count, vectorization_mode=mode, **given)
+            given.setdefault("normalize", True)
+        if self.spec is None:
+            many: gym.vector.VectorEnv = self.environment.vector(count, **given)
+            return many
+        mode = "sync" if self.spec.vector_entry_point is None else "vector_entry_point"
+        return gym.make_vec(self.spec, count, vectorization_mode=mode, **given)
 
     def units(self, envs: gym.vector.VectorEnv, judge: Any) -> dict[str, Any]:
         """Return the entries of a policy's card for the units of ``make``: ``scale`` of the
@@ -316,11 +323,8 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
     }
     shown = {}
     for name, folders in parts.items():
-        others = [other for key, other in parts.items() if key != name]
-        length = 1
-        while length < len(folders) and any(
-            other[-length:] == folders[-length:] for other in others
-        ):
-            length += 1
-        shown[name] = "/".join(folders[-length:])
+        ends = ["/".join(folders[i:]) for i in reversed(range(len(folders)))]
+        others = ["/".join(("", *other)) for key, other in parts.items() if key != name]
+        alone = (end for end in ends if not any(o.endswith(f"/{end}") for o in others))
+        shown[name] = next(alone, ends[-1])
     return shown

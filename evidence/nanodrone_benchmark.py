@@ -28,8 +28,8 @@ from windwrench.identification.logs.text_table import open_table
 from windwrench.identification.motion.smoothing import continuous, runs_of
 from windwrench.identification.prediction import (
     QUANTITIES,
+    distances,
     errors_of_models,
-    offsets,
     predict,
 )
 from windwrench.identification.vehicle_fit.closed_loop import UNITS
@@ -94,19 +94,25 @@ def past_states(states: Array, period: float) -> Array:
     return out
 
 
-def sums(
-    log: FlightLog, truth: Array, vehicle: Vehicle, every: int = 2, begin: Array | None = None
-) -> list[float]:
-    """Return the benchmark's score (4) of a vehicle against logged states (N, 13), from states
-    (N, 13); None: the logged ones.
+def errors_ahead(
+    log: FlightLog, truth: Array, vehicle: Vehicle, every: int, begin: Array | None = None
+) -> Array:
+    """Return a vehicle's mean errors (4, steps) against logged states (N, 13), from states (N, 13);
+    None: the logged ones.
     """
     made = predict(log, vehicle, _HORIZON, every, truth if begin is None else begin)
     parts = made.position, made.quaternion, made.velocity, made.angular_velocity
     path = np.concatenate(parts, axis=2)
     ahead = truth[made.start[:, None] + np.arange(1, path.shape[1] + 1)]
     whole = np.isfinite(ahead).all(axis=(1, 2))
-    distances = np.linalg.norm(offsets(path[whole], ahead[whole]), axis=-1)
-    found: list[float] = distances.mean(axis=0).sum(axis=0).tolist()
+    return distances(path[whole], ahead[whole])
+
+
+def sums(
+    log: FlightLog, truth: Array, vehicle: Vehicle, every: int = 2, begin: Array | None = None
+) -> list[float]:
+    """Return the benchmark's score (4); arguments as of ``errors_ahead``."""
+    found: list[float] = errors_ahead(log, truth, vehicle, every, begin).sum(axis=1).tolist()
     return found
 
 
@@ -142,13 +148,6 @@ def section(result: Mapping[str, Any]) -> str:
         for way in rows[0]["sums"]:
             cells = " | ".join(f"{x:.3g}" for x in mean(rows, "sums", way))
             lines.append(f"| {path} | {way} | {cells} |")
-    loops = result["closed_loop"]
-    lines += ["", f"| closed loop without | {' | '.join(loops)} | unit |"]
-    lines.append("| --- " * (2 + len(loops)) + "|")
-    for name, unit in UNITS.items():
-        known = (loop.get(name) for loop in loops.values())
-        cells = " | ".join("–" if x is None else f"{x[0]:.3g} ± {x[1]:.2g}" for x in known)
-        lines.append(f"| {name} | {cells} | {unit} |")
     made = made_by("python -m evidence.nanodrone_benchmark", [result["commit"]], result["version"])
     return "\n".join([made, "", *lines, ""])
 

@@ -49,8 +49,12 @@ STUDIES: Mapping[str, Study] = {
     },
     "nanodrone": Study("nanodrone_benchmark", "--data {data}/idsia --runs 1", "idsia", 20.0),
     "published": Study(
-        "published", "--racer {data}/racer --imu {data}/crazyflie_imu", "racer", 5.0
+        "published",
+        "--racer {data}/racer --imu {data}/crazyflie_imu --crazyflies {data}/crazyflies",
+        "racer",
+        7.0,
     ),
+    "unseen_flights": Study("unseen_flights", "--data {data}", "nanobench", 8.0),
     "other_engines": Study("other_engines", "", "", 1.0),
     "probabilities": Study(
         "probabilities", "--simulator {data}/../generator/make_flights.py", "../generator", 6.0

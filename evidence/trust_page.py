@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from windwrench.evidence import measured_flights, other_engines, published
+from windwrench.evidence import measured_flights, other_engines, published, unseen_flights
 from windwrench.evidence.kept_results import DOCS, kept
 from windwrench.evidence.nanodrone_benchmark import WAYS, mean
 from windwrench.evidence.probabilities.calibration import figures, flights_of
@@ -18,6 +18,7 @@ RESULTS: Mapping[str, str] = {
     **{part: f"results/{part}.json" for part in measured_flights.PARTS},
     "nanodrone": "identify/nanodrone.json",
     "published": published.RESULTS,
+    "unseen_flights": unseen_flights.RESULTS,
     "other_engines": other_engines.RESULTS,
     "probabilities": "results/probabilities.json.gz",
     "perfect_models": "results/perfect_models.json",
@@ -51,5 +52,6 @@ def page() -> dict[str, Any]:
         "drag": other_engines.DAMPING * other_engines.VEHICLE.mass,
         "band": poisson_band,
         "published": published,
+        "unseen": unseen_flights,
         "nowhere": NOWHERE,
     }

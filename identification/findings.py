@@ -257,12 +257,16 @@ class Ranking:
         values, std = dict(best.coefficients[effect]), dict(best.std[effect])
         likely = [x for x in self.sets if x.probability >= LEAST_RIVAL * best.probability]
         for name in std:
-            own = [x for x in likely if name in x.std.get(effect, ())]
-            value = np.array([x.coefficients[effect][name] for x in own])
-            square = np.square([x.std[effect][name] for x in own])
-            weight = np.array([x.probability for x in own]) / sum(x.probability for x in own)
+            value, own, weight = np.transpose(
+                [
+                    (x.coefficients[effect][name], x.std[effect][name], x.probability)
+                    for x in likely
+                    if name in x.std.get(effect, ())
+                ]
+            )
+            weight /= weight.sum()
             values[name] = float(weight @ value)
-            std[name] = math.sqrt(weight @ (square + np.square(value - values[name])))
+            std[name] = math.sqrt(weight @ (own**2 + (value - values[name]) ** 2))
         return values, std
 
 

@@ -87,15 +87,14 @@ def _piece(
     keep_torque, new_torque = decay_of(tuning.torque_time, s.period, period)
     # the loads are by the logged speeds: a declared lag or efficiency changes a small part of a
     # deviation
-    thrust, x, y, z = body.rotor_wrench(s.rotor_speeds).T
-    none, omega = np.zeros_like(thrust), s.angular_velocity
-    x, y = x - body.com[1] * thrust, y + body.com[0] * thrust
-    turns = [(thrust, none, none), (none, thrust, none), (x, y, none), (none, none, z)]
+    thrust, x, y, z = body.rotor_wrench(s.rotor_speeds).T[..., None]
+    omega, (ahead, left, up) = s.angular_velocity, np.eye(3)
+    turned = (x - body.com[1] * thrust) * ahead + (y + body.com[0] * thrust) * left
     turning = needed[:, 3:] + np.cross(omega, omega @ body.inertia.T)
-    pushing = thrust[:, None] * s.rotation[:, :, 2]
+    pushing = thrust * s.rotation[:, :, 2]
     needs = np.stack([needed[:, :3] - acting[:, :3], pushing, needed[:, :3]], axis=2)
     inverse = np.linalg.inv(body.inertia)
-    loads = acting[:, 3:], *map(np.column_stack, turns), turning
+    loads = acting[:, 3:], thrust * ahead, thrust * left, turned, z * up, turning
     driven = np.einsum("ij,cnj->nic", inverse, np.stack(loads))
     rates = running_integral(driven, s.t)
     rates[:, :, 0] = omega - rates[:, :, 0]
@@ -116,9 +115,9 @@ def _piece(
         model, walks = np.array([[1.0, s.period], [0.0, kept_turn]]), np.diag([hit, turn])
         walked, std = _two_sided(rates[:, i], model, walks, max(noise[0], 1e-6) ** 2)
         torque[:, i], spread[3 + i] = walked[:, 1], std[1] / own[i]
-    turned = np.square(s.rotation)
-    std_force = np.sqrt(spread[:3] ** 2 + turned @ (body.mass * s.bias_std) ** 2)
-    std_torque = np.sqrt(turned @ spread[3:] ** 2)
+    shares = np.square(s.rotation)
+    std_force = np.sqrt(spread[:3] ** 2 + shares @ (body.mass * s.bias_std) ** 2)
+    std_torque = np.sqrt(shares @ spread[3:] ** 2)
     quaternion = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
     torque = np.einsum("nij,jk,nkc->cni", s.rotation, body.inertia, torque)
     outer, *pushed = np.moveaxis(force, 2, 0)

@@ -77,9 +77,9 @@ def predict(
 
     The model starts at a row from position, velocity, attitude and angular velocity. From then on
     only the logged rotor speeds and voltage enter; a rotor speed holds over the interval before its
-    sample. Rotors and effects start with the memory of the flight before. Without ``state``, rows
-    before the start tell the thrust of commands along body axes. Declared sensing effects are taken
-    out of the log. No row after a start changes its state.
+    sample. Rotors and effects start with the memory of the flight before. Rows before the start
+    tell the thrust of commands along body axes. Declared sensing effects are taken out of the log.
+    No row after a start changes its state.
 
     A torque that held-out flights refuted (``vehicle.status``) leaves the body rate as at the
     start, unless the vehicle states the flight loop's reaction (``closed_loop``): the body then
@@ -117,7 +117,7 @@ def predict(
         ]
     )
     starts = starts[finite_rows(states[starts])]
-    x = _flown(log, vehicle, states, starts, ahead, state is None)
+    x = _flown(log, vehicle, states, starts, ahead)
     parts = POSITION, VELOCITY, QUATERNION, RATE
     return Prediction(starts, log.period, *(x[..., part] for part in parts))
 
@@ -145,12 +145,10 @@ def _checked(log: FlightLog, state: ArrayLike) -> Array:
     return states
 
 
-def _flown(
-    log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead: int, shown: bool = True
-) -> Array:
+def _flown(log: FlightLog, vehicle: Vehicle, states: Array, starts: Rows, ahead: int) -> Array:
     """Return the model's states (starts, ahead, STATE), a period apart, from the states (N, STATE)
     of a log at some rows in ascending order. For the memory of effects, the last state holds over
-    rows without one. Where ``shown``, thrust of commands is as the rows before a start show.
+    rows without one. Neighbouring rows with a state show the thrust of commands.
     """
     path = np.zeros((len(starts), ahead, STATE))
     if not len(starts):
@@ -161,6 +159,7 @@ def _flown(
     loop = vehicle.closed_loop
     if vehicle.status.torque == "refuted" and loop is None:
         vehicle = replace(vehicle, inertia=_HEAVY * np.eye(3))
+    shown = _off_ground(log, vehicle, states) & finite & np.roll(finite, 1)
     models = loaded_model(vehicle)[0].copy()
     t = log.t[first:] - log.t[0]
     models[0]["time"] = t[0]
@@ -175,7 +174,7 @@ def _flown(
         states[last_known],
         starts - first,
         log.period,
-        _off_ground(log, vehicle, states)[first:] & shown,
+        shown[first:],
         math.hypot(known.thrust, known.command) if log.commanded else 0.0,
         vehicle.status.force == "refuted",
         reaction,
@@ -226,8 +225,7 @@ class PredictionErrors(NamedTuple):
         horizon = min((part.horizon for part in parts), key=len)
         both = []
         for part in parts:
-            at = np.searchsorted(part.horizon, horizon - 0.5 * part.horizon[0])
-            at = np.minimum(at, len(part.horizon) - 1)
+            at = np.rint(horizon / part.horizon[0]).astype(int).clip(max=len(part.horizon)) - 1
             both.append((part.model[:, at], part.still[:, at]))
         starts = [part.starts for part in parts]
         return cls(sum(starts), horizon, *np.average(both, axis=0, weights=starts))

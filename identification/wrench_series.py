@@ -238,8 +238,7 @@ def _largest_part(series: WrenchSeries, axes: slice, unit: str) -> str:
     total = np.mean(np.square(series.std_wrench[:, axes]))
     parts["the rotors between samples"] = total - sum(parts.values())
     name = max(parts, key=parts.__getitem__)
-    share = f"{100.0 * parts[name] / total:.0f} % of the variance"
-    return f"{1e3 * np.sqrt(total):.3g} m{unit} ({share}: {name})"
+    return f"{1e3 * np.sqrt(total):.3g} m{unit} (mostly {name})"
 
 
 def _notes(log: FlightLog, estimate: WrenchEstimate, smooth: bool) -> Iterator[str]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..dynamics.vehicle import Vehicle
 from ..identification.logs.channels import in_kit_axes, in_kit_units, quaternions, scaled
-from ..identification.logs.flight_log import NORM_TOLERANCE
 from ..identification.logs.log_map import (
     OWN_MAP,
     UNITS,
@@ -22,7 +21,8 @@ from ..identification.logs.log_map import (
 )
 from ..identification.logs.magnitudes import LARGEST
 from ..identification.logs.mapped_log import with_range
-from .messages import SECOND, Array, Malformed, Measurement
+from ..runtime.arrays import Array
+from .messages import SECOND, Malformed, Measurement, normalised
 
 _OUTSIDE = 0.01  # tolerance, share of a command's range
 _FIELDS = {
@@ -122,12 +122,7 @@ class FieldMap:
     def _attitude(self, part: Attitude, values: Array) -> Array:
         quaternion = quaternions(part, values[None])
         if not part.euler:
-            length = np.linalg.norm(quaternion)
-            if not abs(length - 1.0) <= NORM_TOLERANCE:
-                raise Malformed(
-                    f"a quaternion of length {length:.4g}; expected 1 within {NORM_TOLERANCE:g}"
-                )
-            quaternion = quaternion / length
+            quaternion = normalised(quaternion)
         return np.asarray(in_kit_axes(self.map, part, quaternion)[0])
 
 

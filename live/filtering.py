@@ -17,7 +17,8 @@ from ..estimator.estimate import RESTARTED, STATUS, TRACKING
 from ..estimator.row_steps import steps_between
 from ..estimator.tuning import PERIOD
 from ..identification.wrench_series import GATE
-from .messages import Array, Row
+from ..runtime.arrays import Array
+from .messages import Row
 from .tallies import Tallies
 
 _FIRST_ROWS = 21  # their median step is the period

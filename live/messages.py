@@ -9,14 +9,29 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..identification.logs.flight_log import NORM_TOLERANCE
+from ..runtime.arrays import Array
+
 SECOND = 1_000_000_000  # ns
 
 
 class Malformed(ValueError):  # noqa: N818 - of one message, not of the request
     """A message without a usable measurement: the reason, in words."""
+
+
+def normalised(quaternion: Any) -> Array:
+    """Return a quaternion (..., 4) of length 1.
+
+    Raises:
+        Malformed: its length is far from 1.
+    """
+    length = float(np.linalg.norm(quaternion))
+    if not abs(length - 1.0) <= NORM_TOLERANCE:
+        raise Malformed(
+            f"a quaternion of length {length:.4g}; expected 1 within {NORM_TOLERANCE:g}"
+        )
+    return np.asarray(quaternion) / length
 
 
 @dataclass(slots=True, kw_only=True)

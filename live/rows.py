@@ -11,8 +11,9 @@ from operator import itemgetter
 import numpy as np
 
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arrays import Array
 from ..runtime.errors import InputError
-from .messages import Array, Measurement, Row
+from .messages import Measurement, Row
 from .tallies import Tallies
 
 _KEPT = 1.0  # s of rotor speeds kept; poses come much sooner

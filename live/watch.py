@@ -5,9 +5,10 @@ from collections import deque
 import numpy as np
 
 from ..estimator.noise_scale import noise_warning
+from ..runtime.arrays import Array
 from .clocks import Clocks
 from .filtering import LiveFilter, Output
-from .messages import SECOND, Array
+from .messages import SECOND
 from .tallies import Tallies
 
 _EVERY = SECOND  # ns between two looks

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array
 from .errors import InputError
 
 
-def real_numbers(value: object) -> NDArray[np.float64] | None:
+def real_numbers(value: object) -> Array | None:
     """Return an array of real numbers as doubles, NaN where masked; None for anything else, strings
     of digits among them.
     """
@@ -61,6 +62,6 @@ def described(value: object) -> str:
     return kind
 
 
-def in_brackets(values: NDArray[np.float64], digits: int = 3) -> str:
-    """Return a vector (n,) with so many significant digits, for a short ``repr``."""
-    return f"({', '.join(f'{x:.{digits}g}' for x in values)})"
+def in_brackets(values: Array) -> str:
+    """Return a vector (n,) with three significant digits, for a short ``repr``."""
+    return f"({', '.join(f'{x:.3g}' for x in values)})"

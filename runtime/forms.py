@@ -8,7 +8,6 @@ from functools import cache
 from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     BeforeValidator,
     ConfigDict,
@@ -19,6 +18,7 @@ from pydantic import (
     WrapValidator,
 )
 
+from .arrays import Array
 from .errors import InputError, unknown_name
 
 T = TypeVar("T")
@@ -101,7 +101,7 @@ Positive = Annotated[Number, Field(gt=0.0), expected("a positive number")]
 def numbers(*shape: int) -> PlainValidator:
     """Return a validator of an array of finite numbers of this shape."""
 
-    def check(value: object) -> NDArray[np.float64]:
+    def check(value: object) -> Array:
         try:
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):

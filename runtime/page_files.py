@@ -58,8 +58,12 @@ def write_text(text: str, path: Path) -> None:
         partial.write_bytes(gzip.compress(data, 9, mtime=0) if path.suffix == ".gz" else data)
 
 
-def _png_of(figure: "Figure") -> bytes:
-    """Return a figure as a PNG of at most 128 colours."""
+def write_png(figure: "Figure", path: Path) -> None:
+    """Write a figure as a PNG of at most 128 colours, whole or not at all.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
     from PIL import Image
 
     buffer = io.BytesIO()
@@ -68,20 +72,8 @@ def _png_of(figure: "Figure") -> bytes:
     few = picture.quantize(
         _COLOURS, method=Image.Quantize.MEDIANCUT, kmeans=3, dither=Image.Dither.NONE
     )
-    buffer = io.BytesIO()
-    few.save(buffer, format="png", optimize=True)
-    return buffer.getvalue()
-
-
-def write_png(figure: "Figure", path: Path) -> None:
-    """Write a figure as a PNG of at most 128 colours, whole or not at all.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    data = _png_of(figure)
     with replaced(path) as partial:
-        partial.write_bytes(data)
+        few.save(partial, format="png", optimize=True)
 
 
 def write_figure(figure: "Figure", folder: Path, name: str) -> Path:

@@ -9,14 +9,14 @@ import unicodedata
 _UNFIT = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
 
 
-def printable(text: str, keep: str = "\n\t") -> str:
+def printable(text: str) -> str:
     r"""Return a text with an escape such as ``\x1b`` for every character with an effect on a
-    terminal; characters of ``keep`` stay.
+    terminal but line ends and tabs.
     """
     if text.isascii() and text.isprintable():  # nearly all
         return text
     return "".join(
-        c if c in keep or unicodedata.category(c) not in _UNFIT else _escape(c) for c in text
+        c if c in "\n\t" or unicodedata.category(c) not in _UNFIT else _escape(c) for c in text
     )
 
 

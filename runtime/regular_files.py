@@ -28,10 +28,17 @@ _KINDS = (
 
 
 @contextmanager
-def _reading(path: Path, what: str) -> Iterator[None]:
-    """Have any error of the block name the file."""
+def reading(path: Path, what: str) -> Iterator[None]:
+    """Have any error of the block name the file; an ``InputError`` stays as it is.
+
+    Args:
+        path: the file.
+        what: the file's kind, for the error.
+    """
     try:
         yield
+    except InputError:
+        raise
     except Exception as error:  # any error of a parser on bytes of another kind
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise InputError(f"{path}: cannot be read as {what}: {reason}") from error
@@ -54,7 +61,7 @@ def check_regular(path: Path, what: str, most: int | None = None) -> None:
     Raises:
         InputError: the file does not exist, is of another kind, or is larger.
     """
-    with _reading(path, what):
+    with reading(path, what):
         status = path.stat()
     _check_kind(path, status.st_mode, what)
     if most is not None and status.st_size > most:
@@ -70,7 +77,7 @@ def open_regular(path: Path, what: str) -> BinaryIO:
         InputError: the file cannot be opened, or is a folder, a pipe or a device.
     """
     check_regular(path, what)  # opening a device may already do something
-    with _reading(path, what):
+    with reading(path, what):
         # a pipe may have taken the file's place meanwhile: nobody waits for its writer
         file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb")
     try:
@@ -87,7 +94,7 @@ def read_bytes(path: Path, what: str, most: int) -> bytes:
     Raises:
         InputError: the file cannot be read, is no regular file, or is larger.
     """
-    with open_regular(path, what) as file, _reading(path, what):
+    with open_regular(path, what) as file, reading(path, what):
         # a file with too large a stated size is not read; one without a size may still hold more
         large = os.fstat(file.fileno()).st_size > most
         data = b"" if large else file.read(most + 1)
@@ -106,7 +113,7 @@ def read_json(path: Path, what: str) -> Any:
     data = read_bytes(path, what, LIMITS.json_text)
     if not data.strip():
         raise InputError(f"{path}: empty file; expected {what}")
-    with _reading(path, what):
+    with reading(path, what):
         return json.loads(data.decode("utf-8"))
 
 
@@ -123,7 +130,7 @@ def check_archive(path: Path, data: BinaryIO, most: int, what: str, packed: bool
     Raises:
         InputError: no archive, or a larger unpacked size.
     """
-    with _reading(path, what):
+    with reading(path, what):
         if data.read(len(_ARCHIVE)) != _ARCHIVE:
             raise ValueError("no zip archive" if data.tell() else "empty file")
         with zipfile.ZipFile(data) as archive:

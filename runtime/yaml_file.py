@@ -7,7 +7,7 @@ import yaml
 
 from .errors import InputError
 from .file_limits import LIMITS
-from .regular_files import read_bytes
+from .regular_files import read_bytes, reading
 
 LARGEST = LIMITS.yaml_text
 _UNMADE = ("tag:yaml.org,2002:merge", "tag:yaml.org,2002:value")  # keys << and =, without a value
@@ -57,10 +57,8 @@ def read_yaml(path: Path, what: str) -> Any:
         InputError: unreadable, no regular file, too large, or as ``parse_yaml``.
     """
     data = read_bytes(path, what, LARGEST)
-    try:
+    with reading(path, what):
         text = data.decode("utf-8-sig")
-    except ValueError as error:
-        raise InputError(f"{path}: cannot be read as {what}: {error}") from error
     return parse_yaml(text, str(path))
 
 

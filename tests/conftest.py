@@ -1,5 +1,6 @@
 """What holds for the whole suite."""
 
+import gc
 import signal
 
 import pytest
@@ -8,6 +9,17 @@ import pytest
 def pytest_configure(config):
     """Hear interrupts in every process of the suite."""
     hear_interrupts()
+
+
+def pytest_collection():
+    """Collect tests without the collector of garbage, which finds none."""
+    gc.disable()
+
+
+def pytest_collection_finish():
+    """Keep what was imported from the collector, too."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

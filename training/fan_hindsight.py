@@ -10,7 +10,6 @@ offset and velocity, for its memory alone.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..controllers.axis_models import PLACE, SET_POINT, tilting
 from ..controllers.features import Features, History
@@ -20,9 +19,7 @@ from ..controllers.preview import Oracle, lasting, preview
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.lanes.vector import TaskLanes
 from ..envs.observations import as_numbers
-
-Array = NDArray[np.float64]
-Frames = NDArray[np.float32]
+from ..runtime.arrays import Array, Mask, Single
 
 AHEAD = 24  # decisions with known places of the fan, for a command
 # largest taught command, m/s: a fan far away on an unknown side needs a mean far beyond 1
@@ -31,20 +28,7 @@ _COUNTS = 10  # decisions flown until a command counts
 _LEAD = 2.0  # 1/s, gain of the law with sight of the fan that flies the first round
 _VELOCITY = 3  # decisions, over which the fan's velocity is taught
 _ALONG_Y = 1
-# episodes in each scenario, out of nineteen
-MIX = {"base": 4, "fast": 3, "varied": 4, "far": 4} | dict.fromkeys(
-    ("static", "noisy", "gusty", "slow-filter"), 1
-)
 FEATURES = Features(("torque_z", "force_x", "force_y", "velocity_y", "command", "path_y"), 3)
-
-
-def fan_lanes(episodes: int) -> list[TaskLanes]:
-    """Return environments for about so many episodes in the mix of scenarios."""
-    total = sum(MIX.values())
-    return [
-        TaskLanes(max(1, episodes * n // total), task=FanTrackingEnv, scenario=name)
-        for name, n in MIX.items()
-    ]
 
 
 class FanHindsight:
@@ -60,7 +44,7 @@ class FanHindsight:
     def __init__(self, features: Features | None = FEATURES) -> None:
         """Take a policy's inputs; None: the scaled observation."""
         self._features = features
-        oracle = Oracle()
+        self._oracle = oracle = Oracle()
         model = Oracle.steps(oracle.vehicle)[_ALONG_Y]
         self._gain, self._ahead = preview(*model, oracle.effort, AHEAD)
 
@@ -71,10 +55,10 @@ class FanHindsight:
         self._set_point: Any = None  # (n,) m
         self._flown: list[tuple[Array, ...]] = []
 
-    def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Array]:
+    def look(self, observations: Single, infos: dict[str, Any]) -> tuple[Single, Array]:
         """Return frames (n, quantities), and the commands (n, 1) of the law with sight."""
         if self._features is None:
-            seen: Frames = observations / as_numbers(self._envs.task.bounds()[1] or 1.0)
+            seen: Single = observations / as_numbers(self._envs.task.bounds()[1] or 1.0)
         else:
             remember = self._history.push if self._flown else self._history.restart
             remember(self._features.frames(observations))
@@ -97,15 +81,12 @@ class FanHindsight:
     def _own(self, infos: dict[str, Any]) -> Array:
         """Return the states (n, 7) of the vehicles along y."""
         truth = self._envs.truth()
-        up = truth["up"]
-        y = _ALONG_Y
-        turning = tilting(truth["rate"])[y]
-        turned = tilting(truth["angular_acceleration"])[y]
-        middle = up[:, y] / up[:, 2], turning, turned, truth["integral"][:, y]
-        moved = infos["y"], truth["velocity"][:, y], *middle, self._set_point
-        return np.column_stack(moved)
+        still = np.zeros_like(truth["velocity"])
+        place = still + infos["y"][:, None]
+        state = self._oracle.along(truth, place, truth["velocity"], still)[_ALONG_Y]
+        return np.column_stack([state, self._set_point])
 
-    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+    def taught(self, in_flight: Mask) -> tuple[Array, Mask]:
         """Return the best command, the fan's offset (m) and its velocity (m/s), (decisions, n, 3),
         and weights (decisions, n).
         """

@@ -4,14 +4,11 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from ..runtime.arrays import Array, Single
 from .linear_policy import LinearLaw
 from .seeds import training_seed
 from .taught_network import Sequences, TaughtNetwork
-
-Array = NDArray[np.float64]
-Frames = NDArray[np.float32]
 
 _CALM = 0.5  # share of the episodes, after the first round, in which nothing leads off the path
 
@@ -46,14 +43,10 @@ class Flights:
 
     def sequences(self) -> Sequences:
         """Return all flown sequences."""
-        return Sequences(
-            *(
-                np.concatenate([getattr(one, name) for one in self._flown], axis=1)
-                for name in ("seen", "truth", "counts")
-            )
-        )
+        parts = zip(*self._flown, strict=True)
+        return Sequences(*(np.concatenate(part, axis=1) for part in parts))
 
-    def fly(self, network: TaughtNetwork | LinearLaw | None, shares: Frames) -> None:
+    def fly(self, network: TaughtNetwork | LinearLaw | None, shares: Single) -> None:
         """Fly a round at ``shares`` (axes, taught) of the network's means, or with the teacher
         where there is no network.
         """
@@ -66,7 +59,7 @@ class Flights:
             self.episodes += n
 
     def _fly(
-        self, env: Any, network: TaughtNetwork | LinearLaw | None, shares: Frames, size: Array
+        self, env: Any, network: TaughtNetwork | LinearLaw | None, shares: Single, size: Array
     ) -> Sequences:
         lesson = self._lesson
         n = env.num_envs

@@ -15,7 +15,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..controllers import make_controller
 from ..controllers.axis_models import MOTOR_LAG, axis_models
@@ -25,9 +24,7 @@ from ..envs.lanes.vector import TaskLanes
 from ..envs.observations import as_numbers
 from ..envs.wind_scenarios import WIND_SCENARIOS, WindVariation
 from ..evaluation.tasks import TASKS
-
-Array = NDArray[np.float64]
-Frames = NDArray[np.float32]
+from ..runtime.arrays import Array, Mask, Single
 
 AHEAD = 14  # decisions, of which a command knows the disturbances
 LATE = "late"
@@ -41,23 +38,28 @@ _LATE = replace(
         dropout=(0.0, 0.1),
     ),
 )
-MIX = "wide-late"
-# episodes in each scenario, out of sixteen
-_PARTS = {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2} | dict.fromkeys(
-    ("varied", "gusts", "wash", "fan-wall"), 1
-)
+MIX, FAN_MIX = "wide-late", "wide"  # tasks in the wind, and FanTracking
+# parts of the episodes in each scenario
+MIXES = {
+    MIX: {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2}
+    | dict.fromkeys(("varied", "gusts", "wash", "fan-wall"), 1),
+    FAN_MIX: {"base": 4, "fast": 3, "varied": 4, "far": 4}
+    | dict.fromkeys(("static", "noisy", "gusty", "slow-filter"), 1),
+}
 
 
 def mix_of(name: str, episodes: int) -> dict[str, int]:
-    """Return how many of ``episodes`` fly in each scenario of ``MIX``, or in the one scenario."""
-    parts = _PARTS if name == MIX else {name: 1}
-    return {each: episodes * part // sum(parts.values()) for each, part in parts.items()}
+    """Return how many of ``episodes`` fly in each scenario of a mix, at least one, or in the one
+    scenario.
+    """
+    parts = MIXES.get(name, {name: 1})
+    return {each: max(1, episodes * n // sum(parts.values())) for each, n in parts.items()}
 
 
 def lanes_of(
     task: str, scenario: str, episodes: int, observation: str | None = None
 ) -> list[TaskLanes]:
-    """Return environments of a task for so many episodes in a scenario, or in ``MIX``;
+    """Return environments of a task for so many episodes in a scenario, or in one of ``MIXES``;
     ``observation``: one of ``OBSERVATIONS`` in place of the task's own.
     """
     kind = TASKS[task].environment
@@ -114,7 +116,7 @@ class WindLesson:
         self._states: list[list[Array]] = []  # for each axis (n, its states)
         self._laws = [make_controller("lqg", self._task) for _ in range(envs.num_envs * leads)]
 
-    def look(self, observations: Frames, infos: dict[str, Any]) -> tuple[Frames, Any]:
+    def look(self, observations: Single, infos: dict[str, Any]) -> tuple[Single, Any]:
         """Return scaled observations (n, k), and the commands (n, 3) of ``lqg`` in flight."""
         raw = as_numbers(self._envs.task.observe(self._envs.state))
         seen = raw.astype(np.float64)
@@ -123,7 +125,7 @@ class WindLesson:
         wanted = [law(each) for law, each in zip(self._laws, raw, strict=False)]
         return observations / self._scale, np.array(wanted)
 
-    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+    def taught(self, in_flight: Mask) -> tuple[Array, Mask]:
         """Return the best commands (decisions, n, 3), and weights (decisions, n): the vehicle flew
         on for at least ``AHEAD`` further decisions.
         """

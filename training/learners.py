@@ -113,4 +113,4 @@ def dense_weights(layers: Any) -> Weights:
 
 def array_of(tensor: torch.Tensor) -> Any:
     """Return a copy of a tensor's numbers."""
-    return tensor.detach().cpu().numpy().astype(np.float32).copy()
+    return tensor.detach().numpy().copy()

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from ..controllers.trained_policy import Weights
+from ..runtime.arrays import Single
 from .taught_network import Sequences
-
-Array = NDArray[np.float32]
 
 # decisions of the low-passes; 1: the newest observation itself
 MEMORY = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 32.0)
@@ -27,15 +25,15 @@ class LinearLaw:
     """The law as ``Flights`` flies it."""
 
     def __init__(self) -> None:
-        self._rates: Array = (1.0 / np.array(MEMORY, dtype=np.float32))[:, None]
+        self._rates: Single = (1.0 / np.array(MEMORY, dtype=np.float32))[:, None]
 
-    def _remember(self, memory: Array | None, frames: Array) -> Array:
+    def _remember(self, memory: Single | None, frames: Single) -> Single:
         """Return the low-passes (n, memory, quantities) after frames (n, quantities)."""
         if memory is None:
             return np.repeat(frames[:, None], len(MEMORY), axis=1)
         return memory + self._rates * (frames[:, None] - memory)
 
-    def __call__(self, frames: torch.Tensor, state: Any = None) -> tuple[Any, None, Array]:
+    def __call__(self, frames: torch.Tensor, state: Any = None) -> tuple[Any, None, Single]:
         """Return what is taught (1, n, taught), no deviations, and the state for frames (1, n,
         quantities).
         """
@@ -62,6 +60,6 @@ class LinearLaw:
         self._weight = weight.astype(np.float32)
         self._bias = (middle - weight @ mean).astype(np.float32)
 
-    def weights(self, shares: Array) -> Weights:
+    def weights(self, shares: Single) -> Weights:
         """Return the weights of the policy that commands ``shares`` (axes, taught)."""
         return {"weight0": shares @ self._weight, "bias0": shares @ self._bias}

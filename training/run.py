@@ -2,7 +2,6 @@
 
 import platform
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -16,7 +15,6 @@ from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
 from ..envs.definition import TaskDefinition
 from ..evaluation.episodes import fly_episode
-from ..evaluation.tasks import task_of
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.page_files import write_json
@@ -25,7 +23,7 @@ from ..runtime.provenance import package_versions
 from ..runtime.regular_files import read_json
 from .configuration import Config, features_of
 from .seeds import FIRST_VALIDATION_SEED, validation_seeds
-from .training_envs import check_training_env, make_training_env
+from .training_envs import training_task
 
 _SQUASHED = ("sac", "td3")  # algorithms with a tanh behind the policy's output
 
@@ -160,7 +158,6 @@ class Run:
         scenario: scenario or tier to train in.
         seed: the run's.
         folder: for its files.
-        report: called after each validation.
         task: a name, as of ``evaluation.tasks.task_of``.
         reward: one's own, as of ``evaluation.rewards.find_reward``; None: the task's.
         observation: one of ``OBSERVATIONS``; None: the task's own, or features.
@@ -175,12 +172,12 @@ class Run:
         scenario: str,
         seed: int,
         folder: Path,
-        report: Callable[[Progress], None],
-        task: str = STANDARD_TASK,
-        reward: str | None = None,
-        observation: str | None = None,
+        task: str,
+        reward: str | None,
+        observation: str | None,
     ) -> None:
-        check_training_env(scenario, task)
+        known = training_task(task)
+        self.judge = known.make(scenario, reward, observation=observation)
         self.config = config
         self.scenario = scenario
         self.seed = seed
@@ -188,12 +185,10 @@ class Run:
         chosen = {"reward": reward, "observation": observation}
         self.own = {name: value for name, value in chosen.items() if value is not None}
         if task != STANDARD_TASK or observation:
-            self.own["task"] = task_of(task).name
+            self.own["task"] = known.name
         self._claim()
         self.progress = Progress()
-        self._report = report
-        self._began = time.perf_counter()
-        self.judge = make_training_env(scenario, task, reward, observation)
+        self._begun = time.perf_counter()
         self.best = folder / "best.npz"
 
     def _claim(self) -> None:
@@ -214,17 +209,6 @@ class Run:
                 )
         write_json({**run, "versions": _versions()}, path)
 
-    def resume(self, progress: Progress) -> None:
-        """Continue from the progress of an earlier part of the run."""
-        self.progress = progress
-        self._began -= progress.seconds
-
-    def is_due(self, steps: int, last: bool) -> bool:
-        """Whether a validation is due after ``steps`` decisions."""
-        every = self.config["validation"]["every"]
-        before = self.progress.steps[-1] if self.progress.steps else 0
-        return last or steps // every > before // every
-
     def card(self, steps: int) -> dict[str, Any]:
         """Return the card of the policy after ``steps`` decisions."""
         card = card_of(self.config, self.scenario, self.seed, steps) | self.own
@@ -235,12 +219,9 @@ class Run:
                 card["flight"] = flight_of(world)
         return card
 
-    def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> tuple[float, int]:
+    def take_stock(self, policy: TrainedPolicy | TaskPolicy) -> None:
         """Validate a policy, and save the policy as the last, and as the best if no earlier policy
         is better.
-
-        Returns:
-            Its RMSE and losses, as of ``validate``.
         """
         episodes = self.config["validation"]["episodes"]
         rmse, lost, by_error = validate(policy, self.judge, episodes)
@@ -256,10 +237,10 @@ class Run:
             now.best = len(now.rmse_m) - 1
             save_policy(card, policy.weights, self.best)
         self.write_progress()
-        self._report(now)
-        return rmse, lost
 
     def write_progress(self) -> None:
         """Write the run's progress to ``progress.json``."""
-        self.progress.seconds = time.perf_counter() - self._began
+        now = time.perf_counter()
+        self.progress.seconds += now - self._begun
+        self._begun = now
         write_json(asdict(self.progress), self.folder / "progress.json")

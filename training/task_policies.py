@@ -19,19 +19,18 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from ..controllers.features import Features
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, Weights, save_policy
 from ..envs.observations import OBSERVATIONS, as_numbers
 from ..evaluation.tasks import TASKS
-from .fan_hindsight import FEATURES, FanHindsight, fan_lanes
+from ..runtime.arrays import Mask, Single
+from .fan_hindsight import FEATURES, FanHindsight
 from .flown_sequences import Flights
-from .hindsight import MIX, WindLesson, lanes_of
+from .hindsight import FAN_MIX, MIX, WindLesson, lanes_of
 from .linear_policy import MEMORY, LinearLaw
 from .run import origin, validate
 from .taught_network import TaughtNetwork, fit
-
-Array = NDArray[np.float32]
 
 FAN = "FanTracking"
 FAN_PLANE = "FanTracking2D"
@@ -91,18 +90,18 @@ class _FanPlaneLesson:
         self._truth: list[Any] = []
         self._scale = as_numbers(envs.task.bounds()[1] or 1.0)
 
-    def look(self, observations: Array, infos: dict[str, Any]) -> tuple[Array, Any]:
+    def look(self, observations: Single, infos: dict[str, Any]) -> tuple[Single, Any]:
         """Return scaled observations (n, quantities) and the law's commands (n, 2)."""
         truth = np.hstack([infos["fan"] - infos["position"], infos["fan_velocity"]])
         self._truth.append(truth)
         return observations / self._scale, truth @ _shares(FAN_PLANE).T
 
-    def taught(self, in_flight: NDArray[np.bool_]) -> tuple[Any, NDArray[np.bool_]]:
+    def taught(self, in_flight: Mask) -> tuple[Any, Mask]:
         """Return the taught quantities (decisions, n, 4), and weights (decisions, n)."""
         return np.array(self._truth[:-1]), in_flight[:-1]
 
 
-def _shares(task: str, gain: float = _GAINS[1]) -> Array:
+def _shares(task: str, gain: float = _GAINS[1]) -> Single:
     """Return the shares (axes, taught) of each taught quantity in the command."""
     if task == FAN:
         return np.eye(3, dtype=np.float32)[:1]
@@ -111,7 +110,10 @@ def _shares(task: str, gain: float = _GAINS[1]) -> Array:
     return np.eye(3, dtype=np.float32)
 
 
-def _lesson_of(task: str) -> Any:
+def _lesson_of(task: str, features: Features | None) -> Any:
+    """Return the lesson of a task; ``features``: a policy's of FanTracking, if any."""
+    if task == FAN:
+        return FanHindsight(features)
     return _FanPlaneLesson() if task == FAN_PLANE else WindLesson(task)
 
 
@@ -120,17 +122,14 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
 
     Args:
         task: its name.
-        scenario: a scenario of the tasks in the wind, or the mix ``hindsight.MIX``.
+        scenario: a scenario of the task, or one of ``hindsight.MIXES``.
         seed: for flights and network.
         **changed: entries of ``_FIT`` in place of the task's: ``rounds``, ``episodes``, ``epochs``.
     """
     settings = _fit_of(task) | changed
-    if task == FAN:
-        lesson, envs = FanHindsight(), fan_lanes(settings["episodes"])
-        quantities = FEATURES.size
-    else:
-        lesson, envs = _lesson_of(task), lanes_of(task, scenario, settings["episodes"])
-        quantities = len(TASKS[task].environment.scales)
+    lesson = _lesson_of(task, FEATURES)
+    envs = lanes_of(task, scenario, settings["episodes"])
+    quantities = FEATURES.size if task == FAN else len(TASKS[task].environment.scales)
     mirrored = {FAN: FEATURES.mirrored, FAN_PLANE: _TURNED}.get(task)
     shares = _shares(task)
     torch.manual_seed(seed)
@@ -154,7 +153,7 @@ def teach(task: str, scenario: str, seed: int, **changed: Any) -> TaskPolicy | T
 
 
 def _chosen(
-    card: dict[str, Any], weights: Callable[[Array], Weights]
+    card: dict[str, Any], weights: Callable[[Single], Weights]
 ) -> TaskPolicy | TrainedPolicy:
     """Return the policy of ``weights`` of shares; in FanTracking2D with the gain that is best on
     validation episodes in the scenario of its training.
@@ -175,7 +174,7 @@ def linear(
     task's own; other arguments as of ``teach``.
     """
     settings = _LINEAR | changed
-    lesson = FanHindsight(features=None) if task == FAN else _lesson_of(task)
+    lesson = _lesson_of(task, None)
     envs = lanes_of(task, scenario, settings["episodes"], observation)
     law = LinearLaw()
     flights = Flights(envs, lesson, _fit_of(task)["wander"], seed)
@@ -215,18 +214,16 @@ def main() -> None:
     began = time.process_time()
     task = options.task
     changed = {name: asked[name] for name in ("rounds", "episodes", "epochs") if asked[name]}
-    usual = MIX if taught and task not in (FAN, FAN_PLANE) else BASE
-    scenario = "wide" if taught and task == FAN else options.scenario or usual
+    usual = {FAN: FAN_MIX, FAN_PLANE: BASE}.get(task, MIX) if taught else BASE
+    scenario = usual if taught and task == FAN else options.scenario or usual
     if not taught:
         changed |= {"observation": options.observation}
     policy = (teach if taught else linear)(task, scenario, options.seed, **changed)
-    policies = Path("training/policies")
-    kind = policy.card["algorithm"]
-    is_fan_policy = isinstance(policy, TrainedPolicy)
-    out, start = (policies, "") if is_fan_policy else (policies / "tasks", f"{task}-")
-    out = options.out or out
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / f"{start}{kind}-{options.seed}.npz"
+    folder, start = "training/policies/tasks", f"{task}-"
+    if isinstance(policy, TrainedPolicy):
+        folder, start = "training/policies", ""
+    name = f"{start}{policy.card['algorithm']}-{options.seed}.npz"
+    path = Path(options.out or folder, name)
     env = TASKS[task].make(BASE, observation=options.observation)
     rmse, lost, _ = validate(policy, env, VALIDATION)
     policy.card |= {

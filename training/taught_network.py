@@ -1,16 +1,13 @@
 """A recurrent network with taught quantities as its output, and its fit to episodes."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from ..controllers.trained_policy import Weights, layers_of
+from ..runtime.arrays import Single
 from .learners import cell_weights, dense_layers, dense_weights
-
-Array = NDArray[np.float32]
 
 CELLS: dict[str, Any] = {"lstm": torch.nn.LSTM, "gru": torch.nn.GRU}
 _SURE = -4.0  # bounds of an output's logarithmic standard deviation
@@ -20,13 +17,12 @@ _SMALLEST = 1.4e-3  # smallest relevant size of a scaled quantity
 _STEEPEST = 1.0  # norm to which a gradient is cut
 
 
-@dataclass(frozen=True)
-class Sequences:
+class Sequences(NamedTuple):
     """Whole episodes to learn from, time first."""
 
-    seen: Array  # (decisions, episodes, quantities), frames
-    truth: Array  # (decisions, episodes, quantities that are taught)
-    counts: Array  # (decisions, episodes), 0 where the vehicle is lost or the truth unknown
+    seen: Single  # (decisions, episodes, quantities), frames
+    truth: Single  # (decisions, episodes, quantities that are taught)
+    counts: Single  # (decisions, episodes), 0 where the vehicle is lost or the truth unknown
 
 
 class TaughtNetwork(torch.nn.Module):
@@ -69,7 +65,7 @@ class TaughtNetwork(torch.nn.Module):
         deviations = output[..., self.taught :].clamp(_SURE, _UNSURE)
         return output[..., : self.taught], deviations, state
 
-    def whiten(self, seen: Array) -> None:
+    def whiten(self, seen: Single) -> None:
         """Whiten the cell's input by the frames ``seen`` (decisions, episodes, quantities): a small
         difference of two quantities then counts as much as their sum. The policy has the whitening
         in the weights of its cell.
@@ -82,7 +78,7 @@ class TaughtNetwork(torch.nn.Module):
             torch.from_numpy(np.float32(flat.mean(axis=0))),
         )
 
-    def policy_weights(self, shares: Array) -> Weights:
+    def policy_weights(self, shares: Single) -> Weights:
         """Return the weights of the policy that commands ``shares`` (axes, taught) of the means."""
         weights = dense_weights(self.dense)
         last = layers_of(weights) - 1
@@ -103,10 +99,9 @@ def fit(
     batch_size: int,
     rates: tuple[float, float],
     generator: torch.Generator,
-    mirrored: Array | None = None,
-) -> float:
-    """Fit means and deviations to the taught quantities, over whole episodes; return the last
-    epoch's mean loss.
+    mirrored: Single | None = None,
+) -> None:
+    """Fit means and deviations to the taught quantities, over whole episodes.
 
     The loss is the likelihood of normal errors, each times the deviation of the output. Samples
     with a fan hard to locate count less. They count more than by the likelihood alone, which would
@@ -132,9 +127,7 @@ def fit(
     updates = epochs * -(-count // batch_size)
     optimiser = torch.optim.Adam(network.parameters(), lr=rates[0], fused=True)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, updates, eta_min=rates[1])
-    losses: list[float] = []
     for _ in range(epochs):
-        losses.clear()
         for batch in torch.randperm(count, generator=generator).split(batch_size):  # type: ignore[no-untyped-call]
             frames = seen[:, batch]
             taught = truth[:, batch]
@@ -152,5 +145,3 @@ def fit(
             torch.nn.utils.clip_grad_norm_(network.parameters(), _STEEPEST)
             optimiser.step()
             schedule.step()
-            losses.append(loss.item())
-    return float(np.mean(losses))

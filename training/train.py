@@ -55,7 +55,7 @@ def train(
     """
     import_files(imports)
     standard = task == STANDARD_TASK and observation is None
-    run = Run(config, scenario, seed, folder, report, task, reward, observation)
+    run = Run(config, scenario, seed, folder, task, reward, observation)
     from .checkpoint import load_checkpoint, save_checkpoint
     from .learners import make_learner, weights_of
     from .vec_env import FeatureVecEnv
@@ -75,20 +75,30 @@ def train(
     learner.set_logger(_logger(folder))
     checkpoint = folder / "checkpoint.pt"
     if checkpoint.exists():
-        run.resume(progress_from(load_checkpoint(learner, env, checkpoint), checkpoint))
+        run.progress = progress_from(load_checkpoint(learner, env, checkpoint), checkpoint)
     every = config["validation"]["every"]
     between = config["checkpoint"]
-    follow = _follower(advance)
+
+    def follow(collecting: dict[str, Any], _: dict[str, Any]) -> bool:
+        """Tell the decisions so far, and the RMSE of finished training episodes."""
+        advance(learner.num_timesteps)
+        for info in collecting["infos"]:
+            if "rmse" in info:
+                learner.logger.record_mean("rollout/rmse_m", info["rmse"])
+        return True
+
     while (done := learner.num_timesteps) < whole:
-        target = min((done // every + 1) * every, (done // between + 1) * between, whole)
+        validated = done // every
+        target = min((validated + 1) * every, (done // between + 1) * between, whole)
         learner.learn(target - done, callback=follow, reset_num_timesteps=False, log_interval=4)
         done = learner.num_timesteps
-        if run.is_due(done, done >= whole):
+        if done // every > validated or done >= whole:
             kind = TrainedPolicy if standard else TaskPolicy
             policy = kind(run.card(done) | seen, weights_of(learner, algorithm))
-            rmse, lost = run.take_stock(policy)
-            learner.logger.record("validation/rmse_m", rmse)
-            learner.logger.record("validation/lost", lost)
+            run.take_stock(policy)
+            report(run.progress)
+            learner.logger.record("validation/rmse_m", run.progress.rmse_m[-1])
+            learner.logger.record("validation/lost", run.progress.lost[-1])
             learner.logger.dump(done)
         else:
             run.write_progress()
@@ -108,19 +118,3 @@ def _logger(folder: Path) -> Any:
     except ImportError:
         return configure(str(folder), ["csv"])
     return configure(str(folder / "tensorboard"), ["tensorboard"])
-
-
-def _follower(advance: Callable[[int], None]) -> Any:
-    from stable_baselines3.common.callbacks import BaseCallback
-
-    class Follow(BaseCallback):  # type: ignore[misc]
-        """Tell the decisions so far, and the RMSE of finished training episodes."""
-
-        def _on_step(self) -> bool:
-            advance(self.num_timesteps)
-            for info in self.locals["infos"]:
-                if "rmse" in info:
-                    self.logger.record_mean("rollout/rmse_m", info["rmse"])
-            return True
-
-    return Follow()

@@ -1,8 +1,8 @@
 """The environments of training: a scenario, or in FanTracking a tier, a mix of several."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -10,12 +10,9 @@ import numpy as np
 from ..controllers.registry import STANDARD_TASK
 from ..envs.closed_loop import ClosedLoop
 from ..envs.fan_tracking import FanTrackingEnv
-from ..envs.lanes.vector import TaskLanes
 from ..envs.scenarios import SCENARIOS
-from ..envs.vector import TaskVectorEnv
-from ..evaluation.episodes import DECISIONS
-from ..evaluation.tasks import task_of
-from ..runtime.errors import InputError, unknown_name
+from ..evaluation.tasks import BenchmarkTask, task_of
+from ..runtime.errors import InputError
 
 LANES = "ukf-lanes"
 _SCENARIO = 1  # second word of the seed of an episode's scenario
@@ -38,26 +35,17 @@ TIERS: dict[str, tuple[str, ...]] = {
 }
 
 
-def check_training_env(name: str, task: str = STANDARD_TASK) -> None:
-    """Check the name of a training environment.
-
-    Raises:
-        InputError: neither a scenario of the task nor, in FanTracking, a tier.
-    """
-    if task != STANDARD_TASK:
-        task_of(task).scenario(name)
-    elif name not in SCENARIOS and name not in TIERS:
-        raise unknown_name("scenario", name, [*SCENARIOS, *TIERS])
-
-
 class MixedFanTracking(FanTrackingEnv):
-    """Each episode in one of several scenarios, drawn from the episode's seed."""
+    """FanTracking in a scenario, or with each episode in one of a tier's, drawn from the episode's
+    seed.
+    """
 
-    mixes = True
+    scenarios: ClassVar[Mapping[str, Any]] = {**SCENARIOS, **TIERS}
 
-    def __init__(self, scenario: Sequence[str], **named: Any) -> None:
-        super().__init__(scenario[0], **named)
-        self._names = scenario
+    def __init__(self, scenario: Any, **named: Any) -> None:
+        self.mixes = isinstance(scenario, tuple)
+        self._names = scenario if self.mixes else ()
+        super().__init__(scenario[0] if self.mixes else scenario, **named)
 
     def draw_loop(self, rng: np.random.Generator, kept: dict[Any, ClosedLoop]) -> ClosedLoop:
         """Draw a scenario; return the closed loop of an episode in it.
@@ -65,28 +53,19 @@ class MixedFanTracking(FanTrackingEnv):
         The state of the episode's generator seeds another one for the scenario: a draw of the
         former would settle the fan's motion, too.
         """
-        generator = np.random.default_rng((rng.bit_generator.state["state"]["state"], _SCENARIO))
-        name = self._names[int(generator.integers(len(self._names)))]
-        self.scenario = SCENARIOS[name]
-        self.fan = replace(self.fan, turbulence=self.scenario.turbulence)
+        if self.mixes:
+            state = rng.bit_generator.state["state"]["state"]
+            generator = np.random.default_rng((state, _SCENARIO))
+            name = self._names[int(generator.integers(len(self._names)))]
+            self.scenario = SCENARIOS[name]
+            self.fan = replace(self.fan, turbulence=self.scenario.turbulence)
         return super().draw_loop(rng, kept)
 
 
-def make_training_env(
-    name: str,
-    task: str = STANDARD_TASK,
-    reward: str | None = None,
-    observation: str | None = None,
-) -> Any:
-    """Return the environment of a scenario or a tier, in SI units; ``reward`` is one's own.
-
-    Raises:
-        InputError: a name that does not exist.
-    """
-    check_training_env(name, task)
-    if name in TIERS and task == STANDARD_TASK:
-        return MixedFanTracking(TIERS[name], observation=observation)
-    return task_of(task).make(name, reward, observation=observation)
+def training_task(name: str) -> BenchmarkTask:
+    """Return a task by its name, as of ``evaluation.tasks.task_of``; FanTracking has tiers, too."""
+    task = task_of(name)
+    return replace(task, environment=MixedFanTracking) if name == STANDARD_TASK else task
 
 
 def make_training_envs(
@@ -109,18 +88,11 @@ def make_training_envs(
     Raises:
         InputError: an unknown name, or ``ukf-lanes`` with a tier.
     """
-    check_training_env(name, task)
-    arguments: dict[str, Any] = {"observation": observation} if observation else {}
-    if task != STANDARD_TASK:
-        if estimator != "ukf":
-            arguments |= {"plant": "lanes"} if estimator == LANES else {"estimator": estimator}
-        return task_of(task).make_many(count, name, **arguments)
-    arguments |= {"normalize": observation is not None}
-    if estimator == LANES:
-        if name in TIERS:
+    given: dict[str, Any] = {"observation": observation} if observation else {}
+    if task == STANDARD_TASK:
+        given["normalize"] = observation is not None
+        if estimator == LANES and name in TIERS:
             raise InputError(f"training: {LANES} flies one scenario, got {name!r}")
-        return TaskLanes(count, DECISIONS, task=FanTrackingEnv, scenario=name, **arguments)
-    kind = MixedFanTracking if name in TIERS else FanTrackingEnv
-    world = TIERS.get(name, name)
-    arguments |= {"scenario": world, "estimator": estimator}
-    return TaskVectorEnv(count, DECISIONS, task=kind, **arguments)
+    if estimator != "ukf":
+        given |= {"plant": "lanes"} if estimator == LANES else {"estimator": estimator}
+    return training_task(task).make_many(count, name, **given)

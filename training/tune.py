@@ -8,14 +8,13 @@ import numpy as np
 import yaml
 
 from ..controllers.registry import STANDARD_TASK
-from ..envs.scenarios import find_scenario
 from ..evaluation.episodes import fly_episode
-from ..evaluation.tasks import TASKS, task_of
+from ..evaluation.tasks import TASKS, BenchmarkTask
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.page_files import write_text
 from ..runtime.yaml_file import read_yaml
 from .seeds import validation_seeds
-from .training_envs import check_training_env, make_training_env
+from .training_envs import training_task
 
 _GAINS = read_yaml(Path(__file__).parent / "configs" / "gains.yaml", "ranges of gains")
 RANGES: dict[str, dict[str, dict[str, list[float]]]] = _GAINS[
@@ -25,24 +24,22 @@ STARTS: dict[str, dict[str, float]] = _GAINS["starts"]  # for each law
 _PRUNE_AFTER = 10  # episodes
 
 
-def check_request(task: str, law: str, scenario: str, trials: int, episodes: int) -> None:
-    """Check a request to ``tune``.
+def check_request(task: str, law: str, scenario: str, trials: int, episodes: int) -> BenchmarkTask:
+    """Check a request to ``tune``; return its task.
 
     Raises:
         InputError: an unknown task, law or scenario, no trials, or too many episodes.
     """
-    environment = task_of(task).environment
+    known = training_task(task)
     if task not in RANGES:
         raise unknown_name("task", task, RANGES, "train tune")
     if law not in RANGES[task]:
         raise unknown_name("law", law, RANGES[task])
-    if task == STANDARD_TASK:
-        check_training_env(scenario)
-    else:
-        find_scenario(scenario, environment.scenarios)
+    known.scenario(scenario)
     if trials < 1:
         raise InputError(f"tune: trials must be at least 1, got {trials}")
     validation_seeds(episodes)
+    return known
 
 
 def first_gains(task: str, law: str) -> dict[str, float]:
@@ -84,11 +81,10 @@ def tune(
     """
     import optuna
 
-    check_request(task, law, scenario, trials, episodes)
-    tuned_task = task_of(task)
+    tuned_task = check_request(task, law, scenario, trials, episodes)
     ranges = RANGES[task][law]
     seeds = validation_seeds(episodes)
-    env: Any = (make_training_env if task == STANDARD_TASK else tuned_task.environment)(scenario)
+    env = tuned_task.make(scenario)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
     def objective(trial: Any) -> float:

@@ -2,22 +2,22 @@
 features for observations.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from ..controllers.features import Features, History
 from ..envs.definition import LOST_OFFSET
 from ..evaluation.episodes import error_of
 from ..evaluation.rewards import Reward, total_of
+from ..runtime.arrays import Mask, Single
 from .seeds import training_seed
 
-Array = NDArray[np.float32]
+_seed_of_run_0 = partial(training_seed, 0)
 
 
 class FeatureVecEnv(VecEnv):  # type: ignore[misc]
@@ -42,30 +42,27 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         self,
         envs: Any,
         features: Features | None = None,
-        seed_of: Callable[[int, int], int] | None = None,
+        seed_of: Callable[[int, int], int] = _seed_of_run_0,
         reward: Reward | None = None,
     ) -> None:
         self.envs = envs
         self.features = features
-        self._seed_of = seed_of or partial(training_seed, 0)
+        self._seed_of = seed_of
         self._reward = reward
         space = envs.single_observation_space
         if features is not None:
             space = gym.spaces.Box(-10.0, 10.0, (features.size,), np.float32)
         super().__init__(envs.num_envs, space, envs.single_action_space)
         self._history = None if features is None else History(features, self.num_envs)
-        self._seen: Array = np.zeros((self.num_envs, *(space.shape or ())), dtype=np.float32)
         self.episode = np.full(self.num_envs, -1)  # none has begun
         self._length = np.zeros(self.num_envs, dtype=np.int64)  # decisions since the start
         self._returns, self._squares = np.zeros(self.num_envs), np.zeros(self.num_envs)
         self._commands = np.zeros((self.num_envs, 1), dtype=np.float32)
 
-    def _look(self, observations: Array, begun: NDArray[np.bool_] | None = None) -> Array:
+    def _look(self, observations: Single, begun: Mask | None = None) -> Single:
         """Return the learner's observations (n, size); episodes have ``begun`` in some."""
         if self._history is None or self.features is None:
-            new = slice(None) if begun is None else begun
-            self._seen[new] = observations[new]
-            return self._seen.copy()
+            return np.array(observations, dtype=np.float32)
         frames = self.features.frames(observations)
         if begun is None:
             self._history.push(frames)
@@ -73,7 +70,7 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
             self._history.restart(frames, begun)
         return self._history.flat()
 
-    def _begin(self, which: NDArray[np.bool_]) -> Array:
+    def _begin(self, which: Mask) -> Single:
         """Start the next episode of the environments ``which``; return all observations."""
         self.episode[which] += 1
         seeds = [self._seed_of(i, int(e)) for i, e in enumerate(self.episode)]
@@ -82,15 +79,15 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
             sums[which] = 0
         return self._look(observations, which)
 
-    def reset(self) -> Array:
+    def reset(self) -> Single:
         """Start the next episode everywhere; return the features (n, size) of its beginning."""
         return self._begin(np.ones(self.num_envs, dtype=np.bool_))
 
-    def step_async(self, actions: Array) -> None:
+    def step_async(self, actions: Single) -> None:
         """Keep the actions (n, 1) for ``step_wait``."""
         self._commands = np.array(actions, dtype=np.float32)
 
-    def step_wait(self) -> tuple[Array, Array, NDArray[np.bool_], list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Single, Single, Mask, list[dict[str, Any]]]:
         """Fly one decision everywhere; return features (n, size), rewards (n,), dones (n,) and
         infos.
         """
@@ -140,7 +137,3 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Tell SB3 to read ``infos[i]["episode"]``: episodes are counted here."""
         return [wrapper_class.__name__ == "Monitor" for _ in self._get_indices(indices)]
-
-    def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Do nothing: every episode's seed follows from the run's seed and the episode's number."""
-        return [None] * self.num_envs

@@ -22,8 +22,7 @@ EFFECT = Effect(
         ),
     ),
     source="definition; motion capture reaches the vehicle's clock 5 to 30 ms late",
-    excitation="quick manoeuvres tell it from a motor lag, which smooths; dt > 0 and a latency "
-    "leave the same log",
+    excitation="quick manoeuvres: a motor lag smooths them; a latency leaves the log of dt > 0",
     model="clock_offset",
     family=Family.ALIGNMENT,
     role=Role.DELAY,

@@ -13,8 +13,8 @@ EFFECT = Effect(
         Coefficient("s", "1", (-0.05, -0.05), "relative change", minimum=-0.9, maximum=2.0),
     ),
     source="definition; air density and propeller wear change thrust by several per cent",
-    excitation="vertical accelerations of 1 m/s2 and more tell it from a mass (both cancel at "
-    "hover) and a steady force; a whole battery tells it from sag",
+    excitation="vertical accelerations of 1 m/s2 and more: in hover a mass, a thrust scale and a "
+    "vertical force are the same; a whole battery, against sag",
     model="thrust_scale",
     family=Family.THRUST,
     role=Role.THRUST,

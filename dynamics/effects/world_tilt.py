@@ -15,9 +15,8 @@ EFFECT = Effect(
     ),
     source="definition; the ground plane of a motion capture is set with a square on a floor that "
     "is level to some mrad",
-    excitation="yaw through half a turn and more tells it from a tilted thrust axis; from a steady "
-    "force nothing does: a level frame that is tilted leaves just a constant force, of the weight "
-    "times the tilt",
+    excitation="yaw through half a turn and more, against a tilted thrust axis; no flight tells it "
+    "from a steady force: a tilted level frame leaves a constant force, the weight times the tilt",
     model="world_tilt",
     family=Family.ALIGNMENT,
 )

@@ -6,12 +6,11 @@ import numpy as np
 
 from ... import _core
 from ...controllers.flight import BESIDE
-from ...dynamics.motion import Array
+from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError, unknown_name
 from ..closed_loop import ClosedLoop
 from ..definition import TaskDefinition
 from ..plant import TICK
-from ..state import Flags
 from ..truth import true_motion
 from ..vector import SETTLE_TICKS, TaskVectorEnv
 from ..wind.field import Sum
@@ -122,7 +121,7 @@ class TaskLanes(TaskVectorEnv):
 
         self._spread(fly, range(parts))
 
-    def _fly(self, which: Flags) -> None:
+    def _fly(self, which: Mask) -> None:
         slots = np.full(len(self._flying) * self._lanes, -1)
         slots[: self.num_envs][which] = np.flatnonzero(which)
         self._fly_blocks(self._flying, slots, self.task.decision_ticks, self.task.flown.kind)

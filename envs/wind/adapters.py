@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-from .field import Array, Wind
+from .field import Wind
 
 
 class PyFlytWind:

@@ -6,13 +6,11 @@ import math
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ... import _core
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-
-Array = NDArray[np.float64]
-Calls = NDArray[np.int64]
 
 
 @runtime_checkable

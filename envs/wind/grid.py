@@ -7,6 +7,7 @@ dimensions. A file without a time is steady.
 """
 
 import io
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from ...runtime.extras import need
-from ...runtime.regular_files import check_archive, read_bytes
+from ...runtime.regular_files import check_archive, read_bytes, reading
 from ...runtime.whole_files import replaced
-from .field import Array, CompiledWind, Wind
+from .field import CompiledWind, Wind
 
 AXES = ("t", "x", "y", "z")
 _LARGEST = 400_000_000  # bytes of a grid in memory
@@ -48,7 +50,7 @@ class GridWind(CompiledWind):
 
     def __init__(
         self,
-        axes: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],
+        axes: Sequence[ArrayLike],
         wind: ArrayLike,
         where: str = "GridWind",
     ) -> None:
@@ -127,13 +129,9 @@ def read_wind(path: str | Path) -> GridWind:
     if file.suffix not in (".npz", ".nc", ".nc4", ".cdf"):
         raise InputError(f"{file}: expected .npz or .nc")
     read, what = (_read_npz, "arrays") if file.suffix == ".npz" else (_read_netcdf, "netCDF")
-    try:
+    with reading(file, what):
         axes, wind = read(file)
-    except InputError:
-        raise
-    except Exception as error:  # a parser's own, on bytes of another form
-        raise InputError(f"{file}: cannot be read as {what}: {error}") from error
-    return GridWind((axes[0], axes[1], axes[2], axes[3]), wind, str(file))
+    return GridWind(axes, wind, str(file))
 
 
 def _read_npz(file: Path) -> tuple[list[Array], Array]:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...dynamics.mean_jet import AIR_DENSITY, jet_table
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-from .field import Array, CompiledWind, number, vector
+from .field import CompiledWind, number, vector
 from .turbulence import waves
 
 TABLE_PERIOD = 0.02  # s, of the tables of places and speeds

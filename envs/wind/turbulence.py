@@ -14,10 +14,11 @@ hypothesis): a point sees ``u(x - U t)``.
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError, unknown_name
-from .field import Array, CompiledWind, number, vector
+from .field import CompiledWind, number, vector
 
 _FOOT = 0.3048  # m
 # factor on the length; powers of 1 + x along and across, the latter with a factor on x; factor and
@@ -26,7 +27,6 @@ _SPECTRA = {
     "dryden": (1.0, 1, (2, 3.0), (8.0, 3)),
     "von-karman": (1.339, 5 / 6, (11 / 6, 8 / 3), (55 / 9, 17 / 6)),
 }
-FORMS = tuple(_SPECTRA)
 
 
 TURBULENCE = np.dtype(
@@ -38,6 +38,12 @@ TURBULENCE = np.dtype(
         ("advection", "f8", (3,)),  # m/s
     ]
 )
+
+
+def _spectrum_of(form: str) -> tuple[float, float, tuple[float, float], tuple[float, float]]:
+    if form not in _SPECTRA:
+        raise unknown_name("form", form, _SPECTRA, "wind: turbulence")
+    return _SPECTRA[form]
 
 
 def spectrum(form: str, axis: str, wave_number: ArrayLike, sigma: float, length: float) -> Array:
@@ -55,11 +61,9 @@ def spectrum(form: str, axis: str, wave_number: ArrayLike, sigma: float, length:
     Raises:
         InputError: an unknown form or axis.
     """
-    if form not in FORMS:
-        raise unknown_name("form", form, FORMS, "wind: turbulence")
+    scale, along, (across, share), _ = _spectrum_of(form)
     if axis not in ("along", "across"):
         raise unknown_name("axis", axis, ("along", "across"), "wind: turbulence")
-    scale, along, (across, share), _ = _SPECTRA[form]
     x = (scale * length * np.asarray(wave_number, dtype=np.float64)) ** 2
     size = sigma**2 * length / math.pi
     if axis == "along":
@@ -71,7 +75,7 @@ def _energy(form: str, k: Array, length: float) -> Array:
     """Return E(k), m, of unit variance on each axis: ``1/2 k^3 d/dk(1/k dF/dk)`` of the spectrum F
     along a line.
     """
-    scale, *_, (factor, power) = _SPECTRA[form]
+    scale, *_, (factor, power) = _spectrum_of(form)
     x = scale * length * k
     return factor * length / math.pi * x**4 / (1.0 + x * x) ** power
 
@@ -137,8 +141,6 @@ class Turbulence(CompiledWind):
         modes: int = 48,
         smallest: float = 0.2,
     ) -> None:
-        if form not in FORMS:
-            raise unknown_name("form", form, FORMS, "wind: turbulence")
         sizes = _three(sigma, "sigma", at_least_zero=True)
         lengths = _three(length, "length", at_least_zero=False)
         if modes < 1 or number(smallest, "smallest", 0.0) >= 0.5 * lengths.min():
@@ -156,7 +158,7 @@ class Turbulence(CompiledWind):
         super().__init__("waves", parameters, {"waves": table})
 
 
-def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:
+def _three(value: ArrayLike, name: str, at_least_zero: bool) -> Array:
     array = np.asarray(value, dtype=np.float64)
     whole = np.full(3, float(array)) if array.ndim == 0 else array
     good = whole.shape == (3,) and np.all(np.isfinite(whole))

@@ -20,8 +20,8 @@ from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.envs.recording import background, draw_trajectory, record_flight
 from windwrench.evidence.trials.outsiders import HELD_BACK, OUTSIDERS, wrench_input
+from windwrench.identification.diagnosis.coefficients import typical_size
 from windwrench.identification.diagnosis.column import Column
-from windwrench.identification.diagnosis.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
 

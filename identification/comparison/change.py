@@ -30,6 +30,7 @@ from scipy.special import log_softmax, logsumexp, softmax
 
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
+from ..logs.table import ArrayPair
 from .sessions import difference
 from .trim import Trim, features_of
 
@@ -49,8 +50,9 @@ _SIDES = {
     "front": (0.0, 1.0),
     "all rotors": (0.0, 0.0),
 }
-# prior probabilities of the possible changes, by place and kind: all ten places are alike
+# prior probabilities by place and kind: a comparison has a reason, and all ten places are alike
 _CHANGES = {
+    (NOWHERE, ""): 0.4,
     **{(rotor, kind): 0.03 for rotor in _ROTORS for kind in ("weaker", "carries more")},
     **{(place, "carries more"): 0.06 for place in _SIDES},
     (SOMETHING_ELSE, ""): 0.06,
@@ -68,8 +70,6 @@ _VOLTAGE_POWER = 0.5
 # cut propeller do not shrink alike, so the diagonals move.
 # Cuts of 2 to 4 mm moved the diagonals 0.9, and the total 1.0 times as much as the sides
 _BEND = (0.1, 0.1, 0.25, 0.25)
-# prior probability of no change, beside ``_CHANGES``: a comparison has a reason
-_UNCHANGED = 0.4
 SURE = 0.95  # least probability of a place named without a doubt
 
 
@@ -118,30 +118,17 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     late, early = (np.log([trim.voltage for trim in group]).mean() for group in (after, before))
     unchanged[:, 3] += (_VOLTAGE_POWER * np.nan_to_num(late - early)) ** 2
     shares = np.mean([trim.thrust / trim.thrust.sum() for trim in before], axis=0)
-
-    def logs_of(means: Array, spread: Array) -> Array:
-        """Return the log-likelihoods (n,) of the difference for changes of given ``means`` (n, 4)
-        and standard deviations beside the scatter, ``spread`` (n, 4); or one for all of the four.
-        """
+    prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
+    # log posterior, and mean and deviation of the amount; keys: place and kind
+    found = {}
+    for (place, kind), chance in _CHANGES.items():
+        means, spread = _moved(place, kind, shares)
         variance = unchanged[:, None] + spread**2
         off = np.square(ways.mean[:, None] - means) / variance + np.log(2.0 * np.pi * variance)
-        return np.asarray(logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0))
-
-    prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
-    zero = np.zeros(1)
-    # log posterior, and mean and deviation of the amount; keys: place and kind
-    found = {(NOWHERE, ""): (logs_of(zero, zero)[0] + math.log(_UNCHANGED), 0.0, 0.0)}
-    for (place, kind), chance in _CHANGES.items():
-        if place == SOMETHING_ELSE:
-            means = zero
-            spread = _AMOUNTS[:, None]
-        else:
-            means = np.array([_moved(place, kind, amount, shares) for amount in _AMOUNTS])
-            spread = np.linalg.norm(means, axis=1)[:, None] * _BEND
-        every = logs_of(means, spread) + prior
-        weights = softmax(every)
-        middle = _AMOUNTS @ weights
-        std = math.sqrt(np.square(_AMOUNTS - middle) @ weights)
+        every = logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0) + prior
+        weights, amounts = softmax(every), _AMOUNTS * (place != NOWHERE)
+        middle = amounts @ weights
+        std = math.sqrt(np.square(amounts - middle) @ weights)
         found[place, kind] = logsumexp(every) + math.log(chance), middle, std
     chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
@@ -160,13 +147,18 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     )
 
 
-def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
-    """Return how the four numbers move if something changed by ``amount``."""
+def _moved(place: str, kind: str, shares: Array) -> ArrayPair:
+    """Return how the four numbers move (a, 4) by each of ``_AMOUNTS``, and the standard deviations
+    beside the scatter: (a, 4), or one for all four.
+    """
+    amounts = _AMOUNTS[:, None]
     if kind == "weaker":
-        thrust = shares.copy()
-        thrust[list(_ROTORS).index(place)] /= 1.0 - min(amount, 0.9)
-        return features_of(thrust) - features_of(shares)
-    left, front = {**_ROTORS, **_SIDES}[place]
-    # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there
-    way = amount / (1.0 + amount)
-    return np.array([way * left, way * front, 0.0, math.log1p(amount)])
+        lost = np.minimum(amounts, 0.9) * (np.arange(4) == list(_ROTORS).index(place))
+        means = features_of(shares / (1.0 - lost)) - features_of(shares)
+    elif kind:
+        # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there
+        way = amounts / (1.0 + amounts) * [*{**_ROTORS, **_SIDES}[place], 0.0]
+        means = np.hstack([way, np.log1p(amounts)])
+    else:
+        return np.zeros((1, 4)), amounts * (place == SOMETHING_ELSE)
+    return means, np.linalg.norm(means, axis=1, keepdims=True) * _BEND

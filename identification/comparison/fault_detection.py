@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
 
-from ...runtime.arrays import Array, Index
+from ...runtime.arrays import Array
 from ..logs.table import ArrayPair
 from .fault_balance import PARTS, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
@@ -37,13 +37,9 @@ _NOTHING = 0.5
 _EVENTS = (*[0.075] * 4, 0.05, 0.15)
 # the model's error of a loss, as a share: curve, lag and inflow of rotors at a new working point
 _ERROR = 0.25
-_BEFORE = 25  # least intervals of usual flight before a fault
-_AFTER = 4  # least intervals after a fault
-_PLACES = 2000  # most rows for the start of a fault
 # standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
 # usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
-_ROUNDS = 2  # each fits the noise and searches again
 _SURE = 0.95  # least probability of a fault named without a doubt
 
 
@@ -81,10 +77,12 @@ def find_fault(channels: Channels) -> RotorFault:
         InputError: too little flight.
     """
     samples = sample(channels)
-    rows = _rows(len(samples.t))
-    tried = _search(samples, rows, channels.thrust_known)
+    tried = _search(samples, channels.thrust_known)
     best = max(tried, key=lambda one: one.log)
-    evidence, starts, likely = _onsets(samples.t, rows, best)
+    # a jump at each row, by each ramp
+    jumps = best.steps(best.rows, best.ramps)
+    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), samples.t[best.rows])
+    evidence = logsumexp(jumps) - math.log(len(best.ramps) * len(samples.t))
     each, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
@@ -96,31 +94,18 @@ def find_fault(channels: Channels) -> RotorFault:
         samples,
         dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
         1 + rotor,
-        _quantiles(starts, likely, STEP),
+        _quantiles(starts.ravel(), softmax(jumps).ravel(), STEP),
         (1.0 - weights[rotor] @ _LOSSES, max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
     )
 
 
-class _Tried(NamedTuple):
-    """One lag and curve with noise fitted beside the likeliest jump: its row, and the ramp by its
-    number; the log-likelihoods of no jump, and of this one.
-    """
-
-    balance: FaultBalance
-    nothing: float
-    log: float
-    row: int
-    ramp: int
-
-
-def _search(samples: Samples, rows: Index, thrust_known: bool) -> list[_Tried]:
+def _search(samples: Samples, thrust_known: bool) -> list[FaultBalance]:
     """Return all trials: lags, and then curves, each from the best so far."""
-    tried = dict[Interval, _Tried]()
+    tried = dict[Interval, FaultBalance]()
 
     def best_of(keys: Iterable[Interval]) -> Interval:
         for key in keys:
-            if key not in tried:
-                tried[key] = _fitted(FaultBalance(samples, *key), rows)
+            tried[key] = tried.get(key) or FaultBalance(samples, *key)
         return max(tried, key=lambda key: tried[key].log)
 
     curves = _CURVES[:1] if thrust_known else _CURVES
@@ -130,34 +115,7 @@ def _search(samples: Samples, rows: Index, thrust_known: bool) -> list[_Tried]:
     return list(tried.values())
 
 
-def _fitted(balance: FaultBalance, rows: Index) -> _Tried:
-    """Return a lag and curve with noise fitted beside the likeliest jump."""
-    nothing = balance.nothing()
-    for _ in range(_ROUNDS):
-        balance.fit(balance.share(*_jump(balance, rows)[1:]))
-    return _Tried(balance, max(nothing, balance.nothing()), *_jump(balance, rows))
-
-
-def _jump(balance: FaultBalance, rows: Index) -> tuple[float, int, int]:
-    """Return log-likelihood, row and ramp of the likeliest jump, also at rows between ``rows``."""
-    k = int(np.argmax(balance.steps(rows, balance.ramps[:1])))
-    around = np.arange(rows[max(k - 2, 0)], rows[min(k + 2, len(rows) - 1)] + 1)
-    logs = balance.steps(around, balance.ramps)
-    ramp, k = divmod(int(np.argmax(logs)), len(around))
-    return logs[ramp, k], around[k], ramp
-
-
-def _onsets(t: Array, every: Index, best: _Tried) -> tuple[float, Array, Array]:
-    """Return the log-evidence of a jump, times (T,) in s of its start and their probabilities."""
-    rows = np.arange(max(best.row - 5, _BEFORE), min(best.row + 6, every[-1] + 1))
-    ramps = best.balance.ramps
-    logs, fine = (best.balance.steps(some, ramps) for some in (every, rows))
-    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), t[rows])
-    evidence = max(logsumexp(logs), logsumexp(fine))
-    return evidence - math.log(len(ramps) * len(t)), starts.ravel(), softmax(fine).ravel()
-
-
-def _patterns(best: _Tried) -> ArrayPair:
+def _patterns(best: FaultBalance) -> ArrayPair:
     """Return the log-evidence (6,) of rotors 1 to 4, all rotors, and another force and torque; and
     the probabilities of ``_LOSSES`` for each rotor (4, E).
     """
@@ -165,17 +123,16 @@ def _patterns(best: _Tried) -> ArrayPair:
 
     each = _LOSSES[:, None]
     lost = each[_LOSSES <= _ALL_LOSE]
-    share = best.balance.share(best.row, best.ramp)
 
     def seen(columns: Array) -> Array:
         """Return the visible part (4,) of a column in each channel, and its deviation (4,)."""
-        pairs = zip(best.balance.channels, columns.T, strict=True)
+        pairs = zip(best.channels, columns.T, strict=True)
         return np.array([channel.part(column) for channel, column in pairs]).T
 
     # each channel's visible part, its standard deviation, and the hypothesis' means and spread
-    tried = [(*seen(best.balance.lost(rotor, share)), each, _ERROR * each) for rotor in range(4)]
+    tried = [(*seen(best.lost(rotor)), each, _ERROR * each) for rotor in range(4)]
     # a jump of each channel, in parts of one rotor's usual torque or force there
-    jumps = seen(np.tile(share[:, None], 4))
+    jumps = seen(np.tile(best.share[:, None], 4))
     tried.append((*jumps, lost * [0.0, 0.0, 0.0, 4.0], _ERROR * lost * [2.0, 2.0, 2.0, 4.0]))
     tried.append((*jumps, np.zeros((1, 1)), np.array(_OTHER)))
     # channels finite under every hypothesis, so all hypotheses explain the same numbers
@@ -186,15 +143,6 @@ def _patterns(best: _Tried) -> ArrayPair:
     ]
     evidence = [logsumexp(log) - math.log(len(log)) for log in logs]
     return np.array(evidence), softmax(logs[:4], axis=1)
-
-
-def _rows(count: int) -> Index:
-    """Return the rows for the start of a fault: all, or in a long flight an even spread and all
-    rows near the end, with few samples after them.
-    """
-    early, late = np.split(np.arange(_BEFORE, count - _AFTER), [-_PLACES // 4])
-    step = max(1, math.ceil(len(early) / (0.75 * _PLACES)))
-    return np.concatenate([early[::step], late])
 
 
 def _quantiles(values: Array, weight: Array, margin: float) -> Interval:

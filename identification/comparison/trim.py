@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_erosion, uniform_filter1d
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.arrays import Array, Mask
@@ -23,7 +23,6 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, flight_phases, flying, usual_thrust
 from ..logs.table import median_step
-from ..motion.smoothing import runs_of
 
 LEAST_SECONDS = 3.0  # steady flight: a mean over less follows single manoeuvres
 CALM = 1.5  # m/s: faster, the airflow decides how the rotors share the work
@@ -56,12 +55,13 @@ class Trim:
 
 
 def features_of(thrust: Array) -> Array:
-    """Return the four numbers of thrusts (4,): differences in parts of the total, and log(total).
+    """Return the four numbers (..., 4) of thrusts (..., 4).
 
-    The differences are left less right, front less rear, and rotors 1 and 3 less 2 and 4.
+    These are differences in parts of the total, and log(total). The differences are left less
+    right, front less rear, and rotors 1 and 3 less 2 and 4.
     """
-    total = thrust.sum()
-    return np.append(_MIX @ thrust / total, math.log(total))
+    total = thrust.sum(axis=-1, keepdims=True)
+    return np.concatenate([thrust @ _MIX.T / total, np.log(total)], axis=-1)
 
 
 def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | None = None) -> Trim:
@@ -94,10 +94,9 @@ def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | N
         )
     known = np.empty(0) if voltage is None else voltage[steady]
     known = known[(known > 0.0) & (known < np.inf)]
-    ends = np.flatnonzero(np.diff(np.floor(np.cumsum(step) / BATCH))) + 1
-    batches = zip(np.split(thrust, ends), np.split(step, ends), strict=True)
+    batches = np.cumsum(step) // BATCH == np.arange(seconds // BATCH + 1.0)[:, None]
     # the last batch may be a short one
-    means = [batch.mean(axis=0) for batch, steps in batches if steps.sum() > 0.5 * BATCH]
+    means = [thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() > 0.5 * BATCH]
     numbers = [features_of(some) for some in means if some.min() > 0.0]
     noise = np.var(numbers, axis=0, ddof=1) / len(numbers) if len(numbers) > 1 else np.zeros(4)
     return Trim(name, mean, seconds, noise, known.mean() if known.size else math.nan)
@@ -145,16 +144,13 @@ def carrying(t: Array, total: Array) -> Mask:
         t: (N,) s.
         total: (N,) thrust of all rotors, in any unit.
     """
-    steady = np.zeros(len(t), dtype=bool)
-    smooth = _smooth(total, t)
-    for first, end in runs_of(flying(smooth)):  # a single low sample is no landing
-        # a log may begin and end in flight
-        start = t[first] + (EDGE if first > 0 else 0.0)
-        stop = t[end - 1] - (EDGE if end < len(t) else 0.0)
-        steady |= (t >= start) & (t <= stop)
+    smooth = _smooth(total, t)  # a single low sample is no landing
+    around = np.ones(1 + 2 * round(EDGE / median_step(t)))
+    # a log may begin and end in flight
+    steady = binary_erosion(flying(smooth), around, border_value=True)
     if steady.any():
         steady &= np.abs(smooth / np.median(total[steady]) - 1.0) < NEAR
-    return steady
+    return np.asarray(steady)
 
 
 def _smooth(values: Array, t: Array) -> Array:

@@ -13,9 +13,10 @@ from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, NamedEffect
 from ..logs.table import Array, Pair, Values
 from ..motion.inertial_signals import pose_rate
+from .coefficients import CENTRAL, moves_time, unit_of_change
 from .column import Column
 from .log_offsets import ROTOR_TIME_OFFSET
-from .regression import CENTRAL, RegressedFlights, moves_time, unit_of_change
+from .regression import RegressedFlights
 from .worth import BY_CHANCE
 
 FILTERED = (
@@ -162,7 +163,7 @@ def advice(
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)
-            yield f"To tell {' and '.join(group)} apart, fly: {_excitations(group)}"
+            yield f"To tell {' and '.join(group)} apart: {_excitations(group)}"
     if remainder == "structured":
         yield (
             "Fly hover, climbs, level flight at several speeds and turns one at a time: they show "
@@ -178,9 +179,9 @@ def advice(
     if not_identifiable:
         how = "docs/effects.md says what to fly for each"
         if len(not_identifiable) <= FEW:
-            how = f"To identify one, fly: {_excitations(not_identifiable)}"
+            how = f"To identify one: {_excitations(not_identifiable)}"
         yield f"Not identifiable from these flights: {', '.join(not_identifiable)}. {how}"
 
 
 def _excitations(effects: Iterable[str]) -> str:
-    return "; ".join(f"{name}: {get(name).excitation}" for name in effects)
+    return "; ".join(f"{name} needs {get(name).excitation}" for name in effects)

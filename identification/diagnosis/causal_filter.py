@@ -9,69 +9,71 @@ Rotor speeds move linearly between samples.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from ... import _core
 from ...dynamics.effects.own import raise_errors
 from ...dynamics.vehicle import Vehicle
-from ..logs.table import Array, Mask, Rows
+from ..logs.table import Array
 from ..motion.residual import loaded_model
+from .raw_poses import Poses
 from .steady_filter import SteadyFilter
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
-    """Unbroken pieces of flights as measured, one after the other, evenly spaced (n samples)."""
-
-    t: Array  # (n,) s
-    position: Array  # (n, 3) m
-    quaternion: Array  # (n, 4), of continuous sign
-    rotor_speeds: Array  # (n, 4) rad/s, at the samples
-    voltage: Array  # (n,) V; 0 where unknown
-    start: Array  # (p, 6) m/s, and rad/s, body: the velocities at the start of each piece
-    sample: Rows  # (n,) number of the sample in its piece
-    log: Rows  # (n,) index of its log among the flights
-    counted: Mask  # (n,) whether it is in the fit
-
-    @property
-    def begins(self) -> Rows:
-        """Where each piece begins (p,)."""
-        return np.flatnonzero(self.sample == 0)
-
-    @property
-    def pieces(self) -> list[slice]:
-        """The samples of each piece."""
-        return [slice(*ends) for ends in pairwise([*self.begins, len(self.t)])]
-
-
-@dataclass(frozen=True, eq=False)
-class FlightState:
-    """Pieces of flights, one after the other (n samples)."""
-
-    t: Array  # (n,) s
-    position: Array  # (n, 3) m, world
-    rotation: Array  # (n, 3, 3) body to world
-    velocity: Array  # (n, 3) m/s, world
-    angular_velocity: Array  # (n, 3) rad/s, body
-    acceleration: Array  # (n, 3) m/s2, world; of a track (n, 6), and rad/s2, body
-    rotors: Array  # (n, 4) accelerations by the rotors' thrust and torques: m/s2, rad/s2, body
-
-
-@dataclass(frozen=True, eq=False)
-class Track(FlightState):
+class Track:
     """Pieces of flights as the filter saw them, half a step on from sample k.
 
     Row k describes the step from sample k to k + 1; its predictions are of sample k. The
     acceleration includes the disturbance.
     """
 
+    t: Array  # (n,) s
+    position: Array  # (n, 3) m, world
+    rotation: Array  # (n, 3, 3) body to world
+    velocity: Array  # (n, 3) m/s, world
+    angular_velocity: Array  # (n, 3) rad/s, body
+    acceleration: Array  # (n, 6) m/s2, world; rad/s2, body
+    rotors: Array  # (n, 4) accelerations by the rotors' thrust and torques: m/s2, rad/s2, body
     model: Array  # (n, 6) acceleration of the model alone
     predicted: Array  # (n, 7) position and quaternion at sample k, from the samples before
     heading: Array  # (n, 2) cosine and sine, at sample k
     innovations: Array  # (n, 6) m, world; rad, as ``level`` returns them
     disturbance: Array  # (n, 6) m/s2, world; rad/s2
+
+    @classmethod
+    def of(cls, poses: Poses, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> "Track":
+        """Return the pieces as the filter with a vehicle's model sees them.
+
+        Args:
+            poses: the pieces.
+            vehicle: the model.
+            steady: the filter's gains.
+            known: (n, 6, 3) corrections of pose, rate and disturbance of each axis before the pose
+                of sample k is read, in the directions of ``innovations``.
+        """
+        shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
+        written = [np.empty((len(poses.t), *shape)) for shape in shapes]
+        for at, start in zip(poses.pieces, poses.start, strict=True):
+            models = loaded_model(vehicle)[0].copy()
+            _core.run_causal_filter(
+                models.ctypes.data,
+                poses.period,
+                poses.rotor_speeds[at],
+                poses.voltage[at],
+                poses.position[at],
+                poses.quaternion[at],
+                start,
+                steady.gain,
+                steady.keep,
+                known[at],
+                *(x[at] for x in written),
+            )
+            raise_errors()
+        out = cls(poses.t, *written)
+        out.rotors[:] /= [vehicle.mass, *np.diagonal(vehicle.inertia)]
+        return out
 
 
 def level(heading: Array, x: Array) -> Array:
@@ -81,37 +83,3 @@ def level(heading: Array, x: Array) -> Array:
     c, s = heading.T
     ahead, left, up = x.T
     return np.column_stack([c * ahead - s * left, s * ahead + c * left, up])
-
-
-def run(poses: Poses, period: float, vehicle: Vehicle, steady: SteadyFilter, known: Array) -> Track:
-    """Return the pieces as the filter with a vehicle's model sees them.
-
-    Args:
-        poses: the pieces.
-        period: s.
-        vehicle: the model.
-        steady: the filter's gains.
-        known: (n, 6, 3) corrections of pose, rate and disturbance of each axis before the pose of
-            sample k is read, in the directions of ``Track.innovations``.
-    """
-    shapes = ((3,), (3, 3), (3,), (3,), (6,), (4,), (6,), (7,), (2,), (6,), (6,))
-    written = [np.empty((len(poses.t), *shape)) for shape in shapes]
-    for at, start in zip(poses.pieces, poses.start, strict=True):
-        models = loaded_model(vehicle)[0].copy()
-        _core.run_causal_filter(
-            models.ctypes.data,
-            period,
-            poses.rotor_speeds[at],
-            poses.voltage[at],
-            poses.position[at],
-            poses.quaternion[at],
-            start,
-            steady.gain,
-            steady.keep,
-            known[at],
-            *(x[at] for x in written),
-        )
-        raise_errors()
-    out = Track(poses.t, *written)
-    out.rotors[:] /= [vehicle.mass, *np.diagonal(vehicle.inertia)]
-    return out

@@ -59,7 +59,7 @@ def linearised(
     m = base.marginal(base.asked, base.plain, power)
     size = base.size[base.at(m.place)]
     z = from_declared(base.asked, flights, setting)
-    value = 0.5 * (float(z @ z) - m.explained(m.index(m.place), z)) - m.constant
+    value = 0.5 * (float(z @ z) - m.explained(m.place, z)) - m.constant
 
     def target() -> Setting:
         out = {e: dict(values) for e, values in setting.items()}

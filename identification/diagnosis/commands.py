@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from ...dynamics.effects import Role, get, playing
 from ..findings import NamedEffect
 from ..logs.table import NamedNumbers
+from .coefficients import CENTRAL
 from .commanded_rotors import THRUST_FACTORS
-from .regression import CENTRAL, RegressedFlights
+from .regression import RegressedFlights
 
 
 @dataclass(frozen=True, eq=False)

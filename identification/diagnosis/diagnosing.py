@@ -83,9 +83,10 @@ def diagnose(
     ]
     notes = [f"{log.name}: {note}" for log, own in noted for note in own]
     fit = fit_sets(flights, [n for n in names() if n not in without], report)
+    found, balance = fit.found, fit.balance
     effects, not_needed, doubts, probabilities = judged(fit, settings)
     structure = _structure(fit)
-    noisy = fit.noisy or is_beyond_calm(fit.gusts, vehicle) or fit.pushes
+    noisy = balance.noisy or is_beyond_calm(found.gusts, vehicle) or fit.pushes
     remainder = "structured" if structure else "random" if noisy else "none"
     sure = remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
@@ -97,13 +98,13 @@ def diagnose(
     report("predicting the flights")
     named = {e: x for e, x in fit.setting.items() if e}
     amended = flights.amended(named) if named else vehicle
-    posterior = fit.posterior
+    posterior = found.posterior
     said = [effect.name for effect in effects]
     notes += [
         *inertial_notes(flights, said),
         *(sentence for sentences in doubts.values() for sentence in sentences),
-        *cancelling({e: fit.parts[e] for e in said}, fit.after),
-        *late_rotors(flights, fit.needed, fit.sensors),
+        *cancelling({e: fit.parts[e] for e in said}, balance.after),
+        *late_rotors(flights, found.needed, found.sensors),
         *delays_at_bound(fit.setting),
         *outside_the_fit(flights),
     ]
@@ -122,10 +123,10 @@ def diagnose(
         effects=tuple(effects),
         not_needed=tuple(not_needed),
         held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
-        before=Errors(*fit.error_before, *predicted[vehicle]),
-        after=Errors(*fit.error_after, *predicted[amended]),
-        floor_force_rms=fit.floor[0],
-        floor_torque_rms=fit.floor[1],
+        before=Errors(*balance.error_before, *predicted[vehicle]),
+        after=Errors(*balance.error_after, *predicted[amended]),
+        floor_force_rms=balance.floor[0],
+        floor_torque_rms=balance.floor[1],
         advice=tuple(advice(effects, sorted(unseen), remainder, flights.filtered, hidden)),
         notes=tuple(dict.fromkeys(notes)),
         candidates=tuple(Candidate(e, gain, e in said) for e, gain in alone),
@@ -134,18 +135,19 @@ def diagnose(
                 flights.logs[flights.log[rows[0]]].name,
                 flights.period,
                 flights.t[rows],
-                fit.before[rows],
-                fit.after[rows],
+                balance.before[rows],
+                balance.after[rows],
                 ~flights.fit_rows[rows],
                 {effect: part[rows] for effect, part in fit.parts.items()},
             )
             for rows in flights.runs
         ),
         signatures=tuple(
-            signature(flights, fit.setting, e.name, fit.parts[e.name], fit.after) for e in effects
+            signature(flights, fit.setting, e.name, fit.parts[e.name], balance.after)
+            for e in effects
         ),
         structure=structure,
-        gusts=fit.gusts,
+        gusts=found.gusts,
         pushes=tuple(fit.pushes),
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
@@ -157,7 +159,7 @@ def diagnose(
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(hidden),
         doubts=doubts,
-        ranking=fit.ranking,
+        ranking=found.ranking,
         probabilities=probabilities,
     )
 
@@ -166,9 +168,9 @@ def _structure(fit: SetFit) -> tuple[Structure, ...]:
     """Return the dictionary's best column beside the likeliest set, if a cause outside the library
     is likely and shows there.
     """
-    if fit.strange <= 0.5 or fit.ranking.structure <= 0.0:
+    if fit.strange <= 0.5 or fit.found.ranking.structure <= 0.0:
         return ()
-    posterior = fit.posterior
+    posterior = fit.found.posterior
     c, _, gained = posterior.strangest()
     where = f"{CHANNELS[c.number]} with {c.coefficient}"
     if c.part == Part.CHANGING:

@@ -4,21 +4,17 @@ The columns are of the filter's predicted state: none holds the noise of the pos
 """
 
 import itertools
-from collections.abc import Iterable, Sequence
-from dataclasses import fields
-from typing import NamedTuple
+from collections.abc import Iterable
 
 import numpy as np
 
-from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array, ArrayMap, NamedArrays, Rows, median_step
-from ..motion.signals import in_body
+from ..motion.signals import Signals, in_body
 from ..motion.smoothing import filtered
-from .causal_filter import FlightState
-from .column import Column, Part
+from .coefficients import weight_and_torque
+from .column import Column, Columns, Part, Product, along_axis
 from .regression import RegressedFlights
 
-TORQUE_ARM = 0.25  # of the arm: times the weight, the unit of a torque
 HEIGHTS = (0.2, 0.6)  # m above the lowest place: where a bump falls off
 # Hz: a load on a cable of 0.1 to 1.5 m, and a part on a soft mount
 LOAD_HZ = (0.4, 0.55, 0.75, 1.0, 1.4)
@@ -29,72 +25,25 @@ DAMPING_RATIO = 0.08  # of both
 SHARE_OF_EFFECT = 30.0
 
 
-class Product(NamedTuple):
-    """A column (n, 6), multiplied out a part at a time: ten minutes of 150 columns would take 0.9
-    GB.
-    """
-
-    scale: float
-    x: Array  # (n,)
-    y: Array  # (n, k)
-    first: int = 0  # channel of y's first column; the other channels are zero
-
-    @staticmethod
-    def ones(*shape: int) -> Array:
-        """Return ones without memory of their own."""
-        return np.broadcast_to(1.0, shape)
-
-    def part(self, rows: slice) -> "Product":
-        """Return some rows."""
-        return Product(self.scale, self.x[rows], self.y[rows], self.first)
-
-    @property
-    def whole(self) -> Array:
-        """All of it (n, 6)."""
-        out = np.zeros((len(self.x), 6))
-        out[:, self.first : self.first + self.y.shape[1]] = self.scale * self.x[:, None] * self.y
-        return out
-
-
-Columns = dict[Column, Product]
-
-
-def along_axis(axis: int, rotation: Array) -> tuple[Array, int]:
-    """Return the last two fields of a product along an axis of the body, three of force and three
-    of torque.
-    """
-    return (rotation[:, :, axis], 0) if axis < 3 else (Product.ones(len(rotation), 1), axis)
-
-
-def weight_and_torque(vehicle: Vehicle, arm: float = TORQUE_ARM) -> Array:
-    """Return the units (6,) of unknown forces, N, and torques, Nm: the weight, and the weight at a
-    share of the arm.
-    """
-    return vehicle.weight * np.repeat([1.0, arm * vehicle.arm_l], 3)
-
-
-def joined(tracks: Sequence[FlightState]) -> tuple[FlightState, Rows]:
-    """Return all pieces, one after the other, and their ends without the last."""
-    columns = (np.concatenate([getattr(x, f.name) for x in tracks]) for f in fields(FlightState))
-    return FlightState(*columns), np.cumsum([len(track.position) for track in tracks])[:-1]
-
-
 def _scaled(x: Array) -> Array:
     x = x - x.mean()
     size = np.sqrt(np.mean(np.square(x)))
     return x / size if size > 1e-9 else np.zeros_like(x)
 
 
-def discrepancy_columns(whole: FlightState, ends: Rows, flights: RegressedFlights) -> Columns:
+def discrepancy_columns(
+    whole: Signals, rotors: Array, ends: Rows, flights: RegressedFlights
+) -> Columns:
     """Return accelerations (n, 6) by column, each of a standard deviation of the weight, or of the
     weight times the arm.
 
     Args:
-        whole: all pieces.
+        whole: the signals of all pieces.
+        rotors: (n, 4) accelerations by the rotors' thrust and torques: m/s2, rad/s2, body.
         ends: the pieces' ends without the last.
         flights: the vehicle's flights.
     """
-    t, position, rotation, rotors = whole.t, whole.position, whole.rotation, whole.rotors
+    t, position, rotation = whole.t, whole.position, whole.rotation
     rate = whole.angular_velocity
     body = in_body(whole.velocity, rotation)
     # from the sample before: later samples hold the poses' noise
@@ -168,7 +117,7 @@ def _resonance(drive: Array, hertz: float, period: float, ends: Rows) -> Array:
     return np.concatenate([filtered(x, section / section[3]) for x in np.split(drive, ends)])
 
 
-def variables(whole: FlightState) -> NamedArrays:
+def variables(whole: Signals, rotors: Array) -> NamedArrays:
     """Return the variables (n,) of a changing coefficient by name, of mean zero and standard
     deviation one.
     """
@@ -185,7 +134,7 @@ def variables(whole: FlightState) -> NamedArrays:
         "heading's sine": np.sin(heading),
         "heading's cosine": np.cos(heading),
         "time": whole.t,
-        "thrust": whole.rotors[:, 0],
+        "thrust": rotors[:, 0],
         "yaw rate": whole.angular_velocity[:, 2],
     }
     return {name: z for name, x in raw.items() if (z := _scaled(x)).any()}

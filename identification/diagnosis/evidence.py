@@ -6,7 +6,7 @@ set costs a small Cholesky factor.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,21 +15,68 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from ... import _core
-from ..logs.table import Array
+from ..logs.table import Array, ArrayPair
+from .column import Column
 
 Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class SetEvidence:
+    """The evidence of one set of effects, and the mode of its posterior."""
+
+    log_evidence: float
+    mode: Array  # (n,) of n columns, in prior standard deviations
+    std: Array  # (n,)
 
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
     """A quadratic log-likelihood of the coefficients asked about, with all others integrated out:
     ``constant + right @ z - z @ normal @ z / 2``.
+
+    The prior of a coefficient is normal with mean zero and standard deviation one, cut off at its
+    bounds.
     """
 
+    place: Mapping[Column, int]  # the index of each of c columns
+    low: Array  # (c,) bounds, at most zero
+    high: Array  # (c,) at least zero
     normal: Array  # (c, c)
     right: Array  # (c,)
     deviance: float  # with the coefficients at zero, and the others at their mode
     log_volume: float  # minus the logarithm of the integrated volume
+
+    @classmethod
+    def of(
+        cls,
+        columns: Sequence[Column],
+        bounds: ArrayPair,
+        products: Array,
+        asked: Index,
+        others: Index,
+        size: Array | float = 1.0,
+    ) -> "Marginal":
+        """Return the log-likelihood with ``others`` integrated out over their normal prior.
+
+        Args:
+            columns: (a,) to keep.
+            bounds: (a,) least and largest coefficients.
+            products: (c + 1, c + 1) of all columns, in prior standard deviations, and of the
+                residual: the last is -2 log-likelihood with all coefficients at zero.
+            asked: (a,) indices of the kept columns.
+            others: columns to integrate out; they may be among the kept ones as well.
+            size: (len(others),) standard deviations of this prior, with mean zero.
+        """
+        size = np.full(len(others), size)
+        kept = np.append(asked, len(products) - 1)
+        inner = products[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
+        factor = np.linalg.cholesky(inner)
+        known = solve_triangular(factor, products[np.ix_(others, kept)] * size[:, None], lower=True)
+        left = products[np.ix_(kept, kept)] - known.T @ known
+        volume = float(np.log(np.diagonal(factor)).sum())
+        place = {c: i for i, c in enumerate(columns)}
+        return cls(place, *bounds, left[:-1, :-1], left[:-1, -1], float(left[-1, -1]), volume)
 
     @property
     def constant(self) -> float:
@@ -41,61 +88,33 @@ class Marginal:
         """The columns' products with themselves (c,), less the others' share."""
         return np.maximum(np.diagonal(self.normal), 1e-9)
 
-    def explained(self, index: Sequence[int], z: Array) -> float:
+    def at(self, columns: Iterable[Column]) -> tuple[Index, Array, Array]:
+        """Return the indices of some columns, and their part of ``normal`` and ``right``."""
+        at = np.array([self.place[c] for c in columns], dtype=np.intp)
+        return at, self.normal[at[:, None], at], self.right[at]
+
+    def explained(self, columns: Iterable[Column], z: Array) -> float:
         """Return the deviance explained by some columns at coefficients ``z``."""
-        return float(2.0 * self.right[index] @ z - z @ self.normal[np.ix_(index, index)] @ z)
+        _, normal, right = self.at(columns)
+        return float(2.0 * right @ z - z @ normal @ z)
 
+    def gain(self, columns: Sequence[Column]) -> float:
+        """Return the deviance explained by some columns at their mode."""
+        return self.explained(columns, self.evidence(columns).mode)
 
-def marginal(products: Array, asked: Index, others: Index, size: Array | float = 1.0) -> Marginal:
-    """Return the log-likelihood with ``others`` integrated out over their standard normal prior.
+    def evidence(self, columns: Iterable[Column]) -> SetEvidence:
+        """Return the evidence of a set's columns. With the mode at a bound, the integral is of a
+        normal density cut off there.
 
-    Args:
-        products: (c + 1, c + 1) of all columns, in prior standard deviations, and of the residual:
-            the last is -2 log-likelihood with all coefficients at zero.
-        asked: columns to keep.
-        others: columns to integrate out; they may be among the kept ones as well.
-        size: (len(others),) standard deviations of their prior.
-    """
-    size = np.full(len(others), size)
-    kept = np.append(asked, len(products) - 1)
-    inner = products[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
-    factor = np.linalg.cholesky(inner)
-    known = solve_triangular(factor, products[np.ix_(others, kept)] * size[:, None], lower=True)
-    left = products[np.ix_(kept, kept)] - known.T @ known
-    volume = float(np.log(np.diagonal(factor)).sum())
-    return Marginal(left[:-1, :-1], left[:-1, -1], float(left[-1, -1]), volume)
-
-
-@dataclass(frozen=True, eq=False)
-class SetEvidence:
-    """The evidence of one set of effects, and the mode of its posterior."""
-
-    log_evidence: float
-    mode: Array  # (len(index),) in prior standard deviations
-    std: Array  # (len(index),)
-
-
-def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> SetEvidence:
-    """Return the evidence of a set.
-
-    The prior of a coefficient is normal with mean zero and standard deviation one, cut off at its
-    bounds. With the mode at a bound, the integral is of a normal density cut off there.
-
-    Args:
-        m: the likelihood.
-        index: the set's columns.
-        low: (c,) bounds of all columns, at most zero.
-        high: (c,) at least zero.
-
-    Raises:
-        numpy.linalg.LinAlgError: no prior tells columns of the set apart.
-    """
-    at = np.array(index, dtype=np.intp)
-    mode, std = np.empty((2, len(at)))
-    value = _core.evidence(m.normal[at[:, None], at], m.right[at], low[at], high[at], mode, std)
-    if math.isnan(value):
-        raise np.linalg.LinAlgError("no prior tells columns of the set apart")
-    return SetEvidence(m.constant + value, mode, std)
+        Raises:
+            numpy.linalg.LinAlgError: no prior tells columns of the set apart.
+        """
+        at, normal, right = self.at(columns)
+        mode, std = np.empty((2, len(at)))
+        value = _core.evidence(normal, right, self.low[at], self.high[at], mode, std)
+        if math.isnan(value):
+            raise np.linalg.LinAlgError("no prior tells columns of the set apart")
+        return SetEvidence(self.constant + value, mode, std)
 
 
 def bounded_mode(normal: Array, right: Array, low: Array, high: Array) -> Array:

@@ -10,8 +10,9 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ..logs.table import Array
+from .coefficients import Setting
 from .column import Column
-from .regression import RegressedFlights, Setting
+from .regression import RegressedFlights
 
 STD = 0.2  # relative to the mean
 TIME = 2.0  # s, correlation time

@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 
 from ..logs.table import Array, Pair
 from .column import Column
-from .evidence import Marginal, marginal, set_evidence
+from .evidence import Marginal
 from .priors import Base
 
 CONFIDENCE = 0.95  # that a gain is above its bound
@@ -41,11 +41,11 @@ class LeftOut:
 
     def __init__(self, base: Base, columns: Sequence[Column], power: float) -> None:
         at = base.at(columns)
-        self._bounds = base.low[at], base.high[at]
+        bounds = base.low[at], base.high[at]
         asked, others = (np.searchsorted(base.single, x) for x in (at, base.plain))
 
         def likelihood(products: Array) -> Marginal:
-            return marginal(power * products, asked, others)
+            return Marginal.of(columns, bounds, power * products, asked, others)
 
         count = len(base.blocks)
         self.least = float(stdtrit(count, CONFIDENCE)) if count > 1 else -math.inf
@@ -57,15 +57,15 @@ class LeftOut:
             for own in (base.blocks[part == i] for i in np.unique(part))
         ]
 
-    def gain(self, less: Sequence[int]) -> Pair:
+    def gain(self, less: Sequence[Column]) -> Pair:
         """Return the gain in log predictive density of all blocks, nats, and its standard error, of
-        all columns over some (l,), by their indices.
+        all columns over some.
         """
         gained = square = 0.0
         for rest, blocks in self._parts:
-            fitted = set_evidence(rest, range(len(rest.right)), *self._bounds).mode
+            fitted = rest.evidence(rest.place).mode
             change = fitted.copy()
-            change[less] -= set_evidence(rest, less, *self._bounds).mode
+            change[[rest.place[c] for c in less]] -= rest.evidence(less).mode
             for block in blocks:
                 off = float(change @ (block.right - block.normal @ fitted))
                 gained += off + 0.5 * float(change @ block.normal @ change)

@@ -23,19 +23,13 @@ from ..findings import (
 from ..logs.table import Array, NamedNumbers, Names, Values
 from ..motion.smoothing import mean_square
 from .advice import FILTERED, composites
+from .coefficients import CENTRAL, coefficient, typical_size, unit_of_change, without
 from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .commands import Given, what_commands_show
 from .priors import Setting
-from .ranking import FittedPosterior, Report, rank, rank_by_rows
-from .regression import (
-    CENTRAL,
-    RegressedFlights,
-    coefficient,
-    typical_size,
-    unit_of_change,
-    without,
-)
+from .ranking import FittedPosterior, Report, rank
+from .regression import RegressedFlights
 from .residuals import Balance, balance, transient_disturbances
 from .row_nuisances import between_flights
 from .settings import DiagnosisSettings
@@ -48,12 +42,15 @@ LEAST_SIZE = 0.1  # typical sizes, from which a calibration is worth a name
 
 
 @dataclass(frozen=True, eq=False)
-class SetFit(FittedPosterior, Given, Balance):
+class SetFit:
     """The likeliest set of effects behind flights, the facts known before, and the residual beside
     it.
 
     Attributes:
         flights: the vehicle's flights.
+        given: facts known before.
+        found: the posterior, and the fit of its likeliest set.
+        balance: the residual.
         setting: coefficients of the needed effects; under no name the sensors' errors.
         parts: growth of the residual (rows, 6) with one effect left out.
         pushes: transient disturbances.
@@ -61,6 +58,9 @@ class SetFit(FittedPosterior, Given, Balance):
     """
 
     flights: RegressedFlights
+    given: Given
+    found: FittedPosterior
+    balance: Balance
     setting: Setting
     parts: Mapping[str, Array]
     pushes: Sequence[TransientDisturbance]
@@ -69,7 +69,7 @@ class SetFit(FittedPosterior, Given, Balance):
     @property
     def best(self) -> RankedSet:
         """The likeliest set."""
-        return self.ranking.sets[0]
+        return self.found.ranking.sets[0]
 
 
 def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) -> SetFit:
@@ -79,11 +79,7 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
     library = [e for e in library if e not in flights.not_identifiable]
     given = what_commands_show(flights, library)
     report("asking how probable each effect is")
-    likeliest = (
-        rank(flights, library, report)
-        if flights.has_raw_poses
-        else rank_by_rows(flights.of_the_fit(), given.library, given.first, given.fixed, report)
-    )
+    likeliest = rank(flights, given.library, report, given.first, given.fixed)
     sensors = {name: value for name, (value, _) in likeliest.sensors.items()}
     known_apart = {**given.fixed, "": sensors}
     # no set with a larger error on held-out flight is printed
@@ -95,14 +91,14 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
     parts = {e: flights.residual(without(setting, e)) - residual.after for e in setting if e}
     pushes = transient_disturbances(flights, setting)
     return SetFit(
-        **vars(fitted),
-        **vars(given),
-        **vars(residual),
-        flights=flights,
-        setting=setting,
-        parts=parts,
-        pushes=pushes,
-        strange=unknown(fitted.ranking.structure, bool(pushes)),
+        flights,
+        given,
+        fitted,
+        residual,
+        setting,
+        parts,
+        pushes,
+        unknown(fitted.ranking.structure, bool(pushes)),
     )
 
 
@@ -112,17 +108,19 @@ def judged(
     """Return named effects, needless effects, doubts and probabilities, as of ``Diagnosis``;
     ``rule`` says when a name is sure.
     """
-    known = {e: _differs(fit, e) for e in fit.first if e in fit.best.effects}
+    known = {e: _differs(fit, e) for e in fit.given.first if e in fit.best.effects}
     likely = [e for e in fit.best.effects if known.get(e, 1.0) >= rule.least_sure_probability]
-    named = [e for e in fit.needed if e in likely]
+    named = [e for e in fit.found.needed if e in likely]
     rivals = {e: _rivals(fit, e) for e in named}
     for e in {*named}.difference(known):  # an effect, or its rivals in these flights
-        alike = [x.probability for x in fit.ranking.sets if {e, *rivals[e]} & {*x.effects}]
-        factor = fit.posterior.factor_in_set(e)
-        known[e] = beside_unknown(min(sum(alike), 1.0), factor, fit.ranking.structure, fit.strange)
+        alike = [x.probability for x in fit.found.ranking.sets if {e, *rivals[e]} & {*x.effects}]
+        factor = fit.found.posterior.factor_in_set(e)
+        known[e] = beside_unknown(
+            min(sum(alike), 1.0), factor, fit.found.ranking.structure, fit.strange
+        )
     doubts = _doubts(fit, named, rule)
     unsure = bool(set(doubts) - {"assumed thrust"})
-    sizes = worth(fit.flights, fit.fixed, fit.first, fit.needed)
+    sizes = worth(fit.flights, fit.given.fixed, fit.given.first, fit.found.needed)
     names = {e: known[e] for e in named}
     effects = [
         _named(
@@ -134,7 +132,7 @@ def judged(
         )
         for e in named
     ]
-    if late := fit.late:
+    if late := fit.given.late:
         names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
         effects.append(
             replace(
@@ -144,11 +142,13 @@ def judged(
             )
         )
     stated = tuple(
-        Alternative(tuple(e for e in x.effects if e not in fit.first), x.probability)
-        for x in fit.ranking.sets
+        Alternative(tuple(e for e in x.effects if e not in fit.given.first), x.probability)
+        for x in fit.found.ranking.sets
         if x.probability >= LEAST_STATED
     )
-    needless = [_stated(fit, e, *fit.ranking.averaged(e)) for e in likely if e not in fit.needed]
+    needless = [
+        _stated(fit, e, *fit.found.ranking.averaged(e)) for e in likely if e not in fit.found.needed
+    ]
     return effects, needless, doubts, Probabilities(names, stated, fit.strange)
 
 
@@ -168,7 +168,7 @@ def _differs(fit: SetFit, effect: str) -> float:
     """
     apart = [0.0]
     # for a delay: these flights are late, however late others are
-    values, stds = fit.ranking.averaged(effect)
+    values, stds = fit.found.ranking.averaged(effect)
     if get(effect).role != Role.DELAY:
         stds = _of_any_flight(fit.flights, effect, values, stds)
     for name, std in stds.items():
@@ -188,14 +188,14 @@ def _rivals(fit: SetFit, effect: str) -> Names:
     """Return the effects with nearly the likelihood of one in the likeliest set, in its
     place.
     """
-    if effect in fit.first:
+    if effect in fit.given.first:
         factors = playing(*THRUST_FACTORS)
         return tuple(x for x in factors if x != effect) if effect in factors else ()
     own = {*fit.best.effects}
     least = LEAST_RIVAL * fit.best.probability
     swapped = [
         own ^ {*x.effects}
-        for x in fit.ranking.sets
+        for x in fit.found.ranking.sets
         if x.probability > least and len(x.effects) == len(own)
     ]
     return tuple(e for x in swapped if effect in x and len(x) == 2 for e in x - {effect})
@@ -205,7 +205,7 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
     """Return for each check, by its name, sentences with a reason to doubt a name."""
     flights = fit.flights
     unsure = ": all names are tentative" if named else ""
-    found = {e: fit.ranking.averaged(e) for e in fit.needed}
+    found = {e: fit.found.ranking.averaged(e) for e in fit.found.needed}
     doubts = {
         "composite": tuple(composites(flights.vehicle, found)),
         "unknown": (
@@ -221,13 +221,13 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
         "hidden cause": tuple(
             f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like "
             "it. Log the pose to tell them apart"
-            for effect, hidden in fit.behind.items()
+            for effect, hidden in fit.found.behind.items()
             if hidden
         ),
         "assumed thrust": tuple(
             f"{effect}: the log holds motor commands and the vehicle file states no motor "
-            "curve, so how much thrust a command makes is an assumption, and this effect may "
-            "be its error alone. State motor_curve in the vehicle file, or log rotor speeds"
+            "curve, so a command's thrust is assumed, and this effect may be the assumption's "
+            "error alone. State motor_curve in the vehicle file, or log rotor speeds"
             for effect in playing(*THRUST_FACTORS, among=named)
             if flights.thrust_std > 0.0
         ),
@@ -238,7 +238,7 @@ def _doubts(fit: SetFit, named: Sequence[str], rule: DiagnosisSettings) -> dict[
 def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool) -> NamedEffect:
     flights = fit.flights
     vehicle = flights.vehicle
-    found, own = fit.ranking.averaged(effect)
+    found, own = fit.found.ranking.averaged(effect)
     std = _of_any_flight(flights, effect, found, own)
     # the point of action of an effect at the rotors, as declared, is nothing to report
     values = {
@@ -253,7 +253,7 @@ def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool
             for name, x in std.items()
         }
     # shares of the residual's energy without it, each channel over its sensors' noise
-    after = fit.after
+    after = fit.balance.after
     over = mean_square(flights.visible_noise) ** 0.5 + 1e-12
     left, whole = (
         float(mean_square(x[~flights.fit_rows] / over).mean())
@@ -266,7 +266,7 @@ def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool
         indistinguishable_from=others,
         evidence={
             "energy_explained": max(1.0 - left / whole, 0.0) if whole > 0.0 else 0.0,
-            "log_bayes_factor": fit.posterior.log_bayes_factor(effect),
+            "log_bayes_factor": fit.found.posterior.log_bayes_factor(effect),
             "largest_coefficient_in_typical_sizes": max(
                 abs(x) / typical_size(Column(effect, name), vehicle) * (name != CENTRAL)
                 for name, x in values.items()
@@ -274,13 +274,13 @@ def _named(fit: SetFit, effect: str, others: Names, size: float, tentative: bool
             "size_over_what_is_left": size,
             **stated.evidence,
         },
-        channels=carrying_channels(flights, fit.needed, effect),
+        channels=carrying_channels(flights, fit.found.needed, effect),
     )
 
 
 def _stated(fit: SetFit, effect: str, values: Values, std: Values) -> NamedEffect:
     """Return an effect with its gain on flight left out of its fit."""
-    gained, spread = fit.gains[effect]
+    gained, spread = fit.found.gains[effect]
     return NamedEffect(
         name=effect,
         coefficients=values,

@@ -12,17 +12,10 @@ import numpy as np
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
 from ..logs.table import Array, NamedNumbers, Pair, Values
+from .coefficients import CENTRAL, Effects, coefficient, moves_time, typical_size, unit_of_change
 from .column import Column, Part
-from .evidence import Index, Marginal, SetEvidence, marginal, set_evidence
-from .regression import (
-    CENTRAL,
-    Effects,
-    RegressedFlights,
-    coefficient,
-    moves_time,
-    typical_size,
-    unit_of_change,
-)
+from .evidence import Index, Marginal, SetEvidence
+from .regression import RegressedFlights
 
 Setting = dict[str, NamedNumbers]
 # columns of whole effects, with the coefficients of each
@@ -93,19 +86,14 @@ class Base:
         others: Index,
         power: float = 1.0,
         size: Array | float = 1.0,
-    ) -> "_Asked":
+    ) -> Marginal:
         """Return the likelihood, to a power, of the columns asked about, with others integrated
         out; ``size``: standard deviations of their prior, if not their own.
         """
         products = power * self.total
         products[-1, -1] += power * self.penalty
         at = self.at(asked)
-        return _Asked(
-            **vars(marginal(products, at, others, size)),
-            place={c: i for i, c in enumerate(asked)},
-            low=self.low[at],
-            high=self.high[at],
-        )
+        return Marginal.of(asked, (self.low[at], self.high[at]), products, at, others, size)
 
     def mode(self, chosen: Index, power: float = 1.0, draw: bool = False) -> dict[Column, Pair]:
         """Return the coefficients of some columns at the mode without all others, or a draw about
@@ -161,27 +149,6 @@ class Base:
         out = np.ones(len(own))
         out[inside] = np.sqrt(largest / stated)[len(self.plain) :]
         return out
-
-
-@dataclass(frozen=True, eq=False)
-class _Asked(Marginal):
-    """The likelihood of some columns of a base, with all others integrated out."""
-
-    place: dict[Column, int]  # the index of each column
-    low: Array
-    high: Array
-
-    def index(self, columns: Iterable[Column]) -> list[int]:
-        """Return the indices of some of the columns."""
-        return [self.place[c] for c in columns]
-
-    def evidence(self, columns: Iterable[Column]) -> SetEvidence:
-        """Return the evidence of some of the columns."""
-        return set_evidence(self, self.index(columns), self.low, self.high)
-
-    def gain(self, columns: Sequence[Column]) -> float:
-        """Return the deviance explained by some of the columns."""
-        return self.explained(self.index(columns), self.evidence(columns).mode)
 
 
 def variants_of(

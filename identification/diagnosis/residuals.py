@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 
@@ -9,8 +10,8 @@ from ...dynamics.vehicle import Vehicle
 from ..findings import CHANNELS, Disturbance, TransientDisturbance
 from ..logs.table import Array, Pair
 from ..motion.smoothing import CUTOFFS
-from .discrepancy import weight_and_torque
-from .regression import RegressedFlights, Setting
+from .coefficients import Setting, weight_and_torque
+from .regression import RegressedFlights
 
 # times the noise floor; a smaller residual is the sensors' noise
 MOST_FLOOR_RATIO = 1.2
@@ -85,16 +86,16 @@ def transient_disturbances(
         slow = flights.low_passed(residual, cutoff)
         size = np.abs(slow[inner])
         std = np.median(size, axis=0) / 0.6745  # of a normal distribution, despite rare peaks
-        for i, channel in enumerate(CHANNELS):
-            row = inner[np.argmax(size[:, i])]
+        above = size.max(axis=0) / np.maximum(std, 1e-30)
+        rows = inner[size.argmax(axis=0)]
+        for i, (row, channel) in enumerate(zip(rows.tolist(), CHANNELS, strict=True)):
             peak = float(slow[row, i])
-            above = abs(peak) / max(std[i], 1e-30)
-            if above > LEAST_SIGNIFICANCE and abs(peak) > least[i]:
+            if above[i] > LEAST_SIGNIFICANCE and abs(peak) > least[i]:
                 log = flights.logs[flights.log[row]].name
                 push = TransientDisturbance(channel, log, float(flights.t[row]), peak)
-                found.append((above, push))
+                found.append((above[i], push))
     largest: dict[str, TransientDisturbance] = {}
-    for _, push in sorted(found, key=lambda x: -x[0]):
+    for _, push in sorted(found, key=itemgetter(0), reverse=True):
         largest.setdefault(push.channel, push)
     return [*largest.values()]
 

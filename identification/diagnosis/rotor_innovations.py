@@ -16,7 +16,8 @@ from scipy.special import ndtr
 
 from ..logs.table import Array, Mask, Rows
 from ..motion.signals import in_body
-from .causal_filter import Poses, Track, level
+from .causal_filter import Track, level
+from .raw_poses import Poses
 
 # past samples of the rotors in a prediction: a loop's own filter has a memory. Of 23 flights whose
 # loops saw more than their logs, 7 got a wrong probable set with 4 samples, and 4 with 20

@@ -2,17 +2,21 @@
 settings.
 """
 
+import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...dynamics.effects import Role, get, playing
-from ..logs.table import Array, ArrayMap, Pair
+from ..findings import LEAST_RIVAL
+from ..logs.table import Array, ArrayMap, Data, Names, Pair
 from ..motion.smoothing import mean_square
-from .causal_filter import FlightState
 from .climbing import Height, height, linearised, mode
+from .coefficients import Effects, without
 from .column import Column, Part
-from .discrepancy import changing_columns, discrepancy_columns, joined, variables
+from .discrepancy import changing_columns, discrepancy_columns, variables
+from .flight_rows import delivered
 from .gusty_wind import gusts
 from .log_offsets import LAG_ASYMMETRY
 from .priors import (
@@ -23,8 +27,8 @@ from .priors import (
     in_prior_units,
     prior_size,
 )
-from .regression import Effects, RegressedFlights, delivered, without
-from .row_noise import ROUNDS, RowNoise, fitted_noise
+from .regression import RegressedFlights
+from .row_noise import ROUNDS, RowNoise
 from .row_nuisances import answered, followers, row_nuisances
 from .rows import Rows
 
@@ -125,7 +129,7 @@ class RowLikelihood:
             right = np.linalg.solve(factor, x.T @ noise.white(y)[use].ravel())
             z = np.linalg.solve(factor.T, right[:, None] + draws)
             left = [y - X[:, :, : len(known)] @ x for x in z[: len(known)].T]
-            noise = fitted_noise(np.concatenate(left), begins, fit, rows.least)
+            noise = RowNoise.fitted(np.concatenate(left), begins, fit, rows.least)
             noise = noise._replace(begins=rows.begins)
         return noise, z[:, 0]
 
@@ -174,19 +178,16 @@ class RowLikelihood:
         rows = self.rows
         flights = self.flights
         pieces = flights.pieces({})
-        states = []
-        for s in (p.signals for p in pieces):
-            rotors = delivered(s, flights.vehicle) / flights.inertias[2:]
-            # the acceleration is the rotors' alone, without disturbances
-            push = rotors[:, :1] * s.rotation[:, :, 2]
-            states.append(
-                FlightState(
-                    s.t, s.position, s.rotation, s.velocity, s.angular_velocity, push, rotors
-                )
-            )
-        whole, ends = joined(states)
+        names = ("t", "position", "rotation", "velocity", "angular_velocity")
+        joined: Data = {x: np.concatenate([getattr(p.signals, x) for p in pieces]) for x in names}
+        delivery = [delivered(p.signals, flights.vehicle) for p in pieces]
+        rotors = np.concatenate(delivery) / flights.inertias[2:]
+        # the acceleration is the rotors' alone, without disturbances
+        joined["acceleration"] = rotors[:, :1] * joined["rotation"][:, :, 2]
+        whole = replace(pieces[0].signals, **joined)
+        ends = np.cumsum([len(x) for x in delivery])[:-1]
         out = {}
-        for column, made in discrepancy_columns(whole, ends, flights).items():
+        for column, made in discrepancy_columns(whole, rotors, ends, flights).items():
             x = made.whole
             if rows.with_torques or x[:, :3].any():
                 parts = zip(np.split(x, ends), pieces, strict=True)
@@ -194,7 +195,7 @@ class RowLikelihood:
         here = rows.residual(setting)
         own = {e: rows.residual(without(setting, e)) - here for e in setting}
         at = np.concatenate([i + p.rows for i, p in zip([0, *ends], pieces, strict=True)])
-        followed = {name: rows.at_rows(x[at]) for name, x in variables(whole).items()}
+        followed = {name: rows.at_rows(x[at]) for name, x in variables(whole, rotors).items()}
         changing = changing_columns(own, followed)
         return out | {column: made.x[:, None] * made.y for column, made in changing.items()}
 
@@ -261,15 +262,31 @@ class RowLikelihood:
             )
         return out
 
-    def idle(self, setting: Setting, among: Iterable[str]) -> set[str]:
-        """Return the effects of a setting, among some, without any effect there."""
+    def is_idle(self, setting: Setting, among: Iterable[str]) -> bool:
+        """Return whether an effect of a setting, among some, does nothing there."""
         here = self.rows.residual(setting)
         least = 1e-6 * np.abs(here).max()
-        return {
-            effect
-            for effect in among
-            if np.abs(self.rows.residual(without(setting, effect)) - here).max() <= least
-        }
+        parts = (self.rows.residual(without(setting, e)) - here for e in among)
+        return any(np.abs(part).max() <= least for part in parts)
+
+    def behind(self, best: Setting) -> dict[str, Names]:
+        """Return, for each effect of a set, possible effects hidden in the logs with as much
+        explained in its place.
+        """
+        flights = self.flights
+        unseen = sorted(flights.needs_pose - flights.without_trace - set(best))
+        hidden = [e for e in unseen if not flights.is_nonlinear(e)]
+        if not hidden or not best:
+            return {}
+        base = self.base(best, {}, [*best, *hidden])
+        m = base.marginal(base.asked, base.plain, self.power)
+
+        def explained(effects: set[str]) -> float:
+            return m.gain([c for c in m.place if c.effect in effects])
+
+        # up to the deviance of a rival's likelihood
+        whole = explained(set(best)) + 2.0 * math.log(LEAST_RIVAL)
+        return {e: tuple(h for h in hidden if explained({*best, h} - {e}) > whole) for e in best}
 
 
 def _named(columns: ArrayMap) -> dict[Column, Array]:

@@ -48,30 +48,30 @@ class RowNoise(NamedTuple):
         root = np.linalg.inv(np.linalg.cholesky(self.covariance))
         return np.asarray(np.einsum("ij,nj...->ni...", root, out))
 
+    @classmethod
+    def fitted(cls, x: Array, begins: Mask, fit: Mask, least: Array) -> "RowNoise":
+        """Return the noise of rows ``x`` (n, c) from its sample ``fit`` (n,): least squares, with a
+        little white noise added, and white noise of ``least`` (c,).
+        """
+        channels = x.shape[1]
+        lags = min(max(int(fit.sum()) // (ROWS_PER_NUMBER * channels), 1), MOST_LAGS)
+        size = np.sqrt(mean_square(x[fit]) + np.square(least))
+        z = x / size
+        use = fit & _with_earlier(begins, lags)
+        each_lag = range(1, lags + 1)
+        for k in each_lag:
+            use[k:] &= fit[:-k]
+        at = np.flatnonzero(use)
+        past = np.column_stack([z[at - k] for k in each_lag])
+        now = z[at]
+        loading = len(at) * (LOADING + np.square(least / size))
+        fitted = np.linalg.solve(past.T @ past + np.diag(np.tile(loading, lags)), past.T @ now)
+        left = now.T @ now + np.diag(loading) - fitted.T @ (past.T @ now)
+        covariance = left / max(len(at) - lags * channels, 1)
+        each = fitted.reshape(lags, channels, channels).swapaxes(1, 2)
+        return cls(size[:, None] * each / size, size[:, None] * covariance * size, begins)
+
 
 def _with_earlier(begins: Mask, count: int) -> Mask:
     first = np.flatnonzero(begins)[np.cumsum(begins) - 1]
     return np.asarray(np.arange(len(begins)) - first >= count)
-
-
-def fitted_noise(x: Array, begins: Mask, fit: Mask, least: Array) -> RowNoise:
-    """Return the noise of rows ``x`` (n, c) from its sample ``fit`` (n,): least squares, with a
-    little white noise added, and white noise of ``least`` (c,).
-    """
-    channels = x.shape[1]
-    lags = min(max(int(fit.sum()) // (ROWS_PER_NUMBER * channels), 1), MOST_LAGS)
-    size = np.sqrt(mean_square(x[fit]) + np.square(least))
-    z = x / size
-    use = fit & _with_earlier(begins, lags)
-    each_lag = range(1, lags + 1)
-    for k in each_lag:
-        use[k:] &= fit[:-k]
-    at = np.flatnonzero(use)
-    past = np.column_stack([z[at - k] for k in each_lag])
-    now = z[at]
-    loading = len(at) * (LOADING + np.square(least / size))
-    fitted = np.linalg.solve(past.T @ past + np.diag(np.tile(loading, lags)), past.T @ now)
-    left = now.T @ now + np.diag(loading) - fitted.T @ (past.T @ now)
-    covariance = left / max(len(at) - lags * channels, 1)
-    each = fitted.reshape(lags, channels, channels).swapaxes(1, 2)
-    return RowNoise(size[:, None] * each / size, size[:, None] * covariance * size, begins)

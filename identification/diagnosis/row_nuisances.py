@@ -9,11 +9,12 @@ import numpy as np
 
 from ...dynamics.effects import Role, get
 from ..logs.table import Array, NamedArrays
+from .coefficients import coefficient, unit_of_change
 from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .log_offsets import ROTOR_TIME_OFFSET
 from .priors import MODEL_ERROR
-from .regression import RegressedFlights, coefficient, unit_of_change
+from .regression import RegressedFlights
 from .rows import Rows
 
 # standard deviations of the differences from flight to flight

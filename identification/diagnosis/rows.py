@@ -14,9 +14,10 @@ from ...runtime.arrays import Index
 from ..logs.table import Array
 from ..motion.signals import in_body
 from ..motion.smoothing import CUTOFFS, low_pass
+from .coefficients import Setting, weight_and_torque
 from .column import Column
-from .discrepancy import weight_and_torque
-from .regression import RegressedFlights, Setting, blocks
+from .flight_rows import blocks
+from .regression import RegressedFlights
 
 COMMANDED_CUTOFF_HZ = 3.5  # for rotors known by commands
 FILTERED_CUTOFF_HZ = 2.0  # for a filtered pose: well below any filter

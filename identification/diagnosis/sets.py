@@ -13,6 +13,7 @@ from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import LEAST_RIVAL, RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
+from .coefficients import CENTRAL, Effects, coefficient, moves_time, typical_sizes
 from .column import Column, Part
 from .discrepancy import SHARE_OF_EFFECT
 from .evidence import Index, Marginal, SetEvidence, evidence_of_one_more, tempering
@@ -27,14 +28,7 @@ from .priors import (
     changed,
     variants_of,
 )
-from .regression import (
-    CENTRAL,
-    Effects,
-    RegressedFlights,
-    coefficient,
-    moves_time,
-    typical_sizes,
-)
+from .regression import RegressedFlights
 
 MOST_EFFECTS = 5  # in a set, beside the given ones
 KEPT_SETS = 8  # of each size, extended by a further effect
@@ -99,6 +93,7 @@ def is_possible(
     )
 
 
+@dataclass(eq=False)
 class Posterior:
     """The evidence of sets, of all bases together.
 
@@ -107,33 +102,30 @@ class Posterior:
         library: names of effects.
         bases: the likelihood beside some sets. The first has the noise of nothing explained.
         power: of the likelihood.
-        given: effects in every set. Then all sets share one noise, and the base with most of a
-            set's effects judges it; a single base has them all. Without given effects each base has
+        among: effects in every set. Then all sets share one noise, and the base with most of a
+            set's effects judges it; a single base has them all. Without them each base has
             a noise of its own, and a set's likeliest counts.
         idle: sets to leave out: their best fit has an effect that does nothing.
     """
 
-    def __init__(
-        self,
-        flights: RegressedFlights,
-        library: Sequence[str],
-        bases: Sequence[Base],
-        power: float = 1.0,
-        given: Effects | None = None,
-        idle: Collection[Effects] = (),
-    ) -> None:
-        self.flights, self.library, self.bases, self.power = flights, library, bases, power
-        self.idle = idle
-        self.given = given or frozenset()
-        self.one_noise = given is not None
-        inclusion = min(EXPECTED / max(len(library) - len(self.given), 1), 0.5)
+    flights: RegressedFlights
+    library: Sequence[str]
+    bases: Sequence[Base]
+    power: float = 1.0
+    among: Effects | None = None
+    idle: Collection[Effects] = ()
+
+    def __post_init__(self) -> None:
+        self.given = self.among or frozenset()
+        self.one_noise = self.among is not None
+        inclusion = min(EXPECTED / max(len(self.library) - len(self.given), 1), 0.5)
         self.odds = math.log(inclusion / (1.0 - inclusion))  # before the flight, of an effect
         self.known: dict[Effects, _Candidate] = {}
         self.scores: dict[Effects, float] = {}
         # the likeliest set without needless effects, once asked
         self._needed: _Candidate | None = None
         # beside the noise of nothing explained no effect shows: only sets found elsewhere go there
-        for i in range(0 if self.one_noise else 1, len(bases)):
+        for i in range(0 if self.one_noise else 1, len(self.bases)):
             self._search(i)
         if not self.one_noise:
             self._search(0, [self.known[k].variants for k in self._ranked[:KEPT_ASKED]])
@@ -171,10 +163,10 @@ class Posterior:
             for variant in best.variants:
                 effect = variant[0].effect
                 rest = tuple(x for x in best.variants if x != variant)
-                kept = {v[0].effect for v in rest}
-                gained, std = gains[effect] = left_out.gain(m.index(chain.from_iterable(rest)))
-                smaller = _Candidate(base, rest, m.evidence(chain.from_iterable(rest)))
-                least = left_out.least * std - self.odds * len(every - kept)
+                less = [*chain.from_iterable(rest)]
+                gained, std = gains[effect] = left_out.gain(less)
+                smaller = _Candidate(base, rest, m.evidence(less))
+                least = left_out.least * std - self.odds * len(every - {c.effect for c in less})
                 if gained < least and self._possible(smaller):
                     weak[probability[effect], gained / (std + 1e-9)] = smaller
             if not weak:
@@ -321,7 +313,7 @@ class Posterior:
         base = best.base
         m = base.marginal(best.columns, base.plain, self.power)
         whole = m.deviance - self.power * base.penalty
-        return whole - m.explained(range(len(m.right)), best.evidence.mode)
+        return whole - m.explained(m.place, best.evidence.mode)
 
     def alone(self) -> NamedNumbers:
         """Return the deviance of each effect of the library alone, beside the given effects, over
@@ -362,8 +354,8 @@ class Posterior:
                 continue
             sign = np.sign([coefficient(c).typical[0] for c in columns])
             z = base.typical[base.at(columns)] * sign
-            i = m.index(columns)
-            out[effect] = max(float(z @ m.normal[np.ix_(i, i)] @ z), out.get(effect, 0.0))
+            _, normal, _ = m.at(columns)
+            out[effect] = max(float(z @ normal @ z), out.get(effect, 0.0))
         return out
 
     def _dictionary_beside_best(self, base: Base) -> Marginal:

@@ -7,26 +7,29 @@ like the residual along the flights.
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Coefficients, Unexplained
-from ..logs.table import Array
+from ..logs.table import Array, Values
 from ..motion.smoothing import mean_square
-from .regression import RegressedFlights, Setting, typical_sizes
+from .coefficients import Setting, moves_time, typical_size, typical_sizes
+from .column import Column, Part
+from .priors import Starts
+from .regression import RegressedFlights
 
 MOST_TRIED = 12  # starts; no more are tried all
 KEPT_OF_MORE = 4  # starts of more, the most like the residual
+# typical sizes of the trials of a lag or a delay as a whole: their columns change with them
+TIME_STARTS = (0.3, 0.6, 1.2)
 SAMPLE_STEP = 20  # one of so many samples is enough to compare
 
 
-def starting_points(
+def _starting_points(
     effect: str,
     flights: RegressedFlights,
     residual: Array,
-    stated: Coefficients,
     beside: Iterable[str] = (),
 ) -> Sequence[Coefficients]:
     """Return the coefficients from which a fit of an effect starts.
@@ -35,14 +38,14 @@ def starting_points(
         effect: its name. It declares starting points.
         flights: the searched flights.
         residual: the unexplained residual (rows, 6).
-        stated: coefficients fixed by the vehicle's file.
         beside: other effects in action.
     """
     declared = get(effect).starting_points
     assert declared is not None, f"{effect} declares no starting points"
     position = flights.at_rows("position")
+    stated = flights.stated(effect)
     seen = flights.fit_rows
-    starts = declared(
+    started = declared(
         Unexplained(
             flights.vehicle,
             typical_sizes(effect, flights.vehicle),
@@ -55,19 +58,11 @@ def starting_points(
             residual[seen, 3:],
         )
     )
+    starts = [{**start, **stated} for start in started]
     if len(starts) <= MOST_TRIED:
         return starts
-    # an effect without a state or clock of its own does the same in the same sample, so a few
-    # samples are enough. To find out, one sample is repeated for a minute, in step with no whole Hz
     pieces = flights.pieces({})
-    one = pieces[0].signals.at(np.zeros(200, dtype=np.int64))
-    acts = flights.acting(replace(one, period=0.317), {effect: starts[0]})
-    steady = bool(np.all(acts == acts[0]))
     step = max(1, SAMPLE_STEP // int(np.diff(pieces[0].rows)[0]))
-    sampled = [
-        (p.signals.at(p.rows[::step]), slice(None)) if steady else (p.signals, p.rows[::step])
-        for p in pieces
-    ]
     chosen = np.concatenate([rows[::step] for rows in flights.runs])
     used = seen[chosen]
     target = residual[chosen[used]]
@@ -77,7 +72,7 @@ def starting_points(
         # the same starts are tried beside several sets
         key = str(setting) + effect
         if key not in flights.started:
-            parts = [flights.acting(signals, setting)[x] for signals, x in sampled]
+            parts = [flights.acting(p.signals, setting)[p.rows[::step]] for p in pieces]
             flights.started[key] = np.concatenate(parts)[used]
         return np.asarray(flights.started[key] * scale)
 
@@ -91,3 +86,25 @@ def starting_points(
         if size > 0.0:
             likeness.append((np.sum(shape * target * scale) / math.sqrt(size), i))
     return [starts[i] for _, i in sorted(likeness, reverse=True)[:KEPT_OF_MORE]]
+
+
+def starts_of(
+    flights: RegressedFlights, library: Sequence[str], setting: Setting, *others: Setting
+) -> Starts:
+    """Return columns of whole effects outside a setting, with the coefficients of each: lags and
+    delays, and effects whose coefficients do nothing one by one. The latter start from the residual
+    of the setting, and of ``others``: an effect may act in the place of another.
+    """
+    out: dict[Column, Values] = {}
+    beside = [*setting, *(e.name for e in flights.vehicle.effects)]
+    for effect in (e for e in library if e not in setting):
+        own: list[Values] = []
+        if moves_time(effect) and get(effect).kind == "rotor input":
+            name = get(effect).coefficients[0].name
+            typical = typical_size(Column(effect, name), flights.vehicle)
+            own = [{name: share * typical} for share in TIME_STARTS]
+        elif flights.is_nonlinear(effect):
+            for x in (setting, *others):
+                own += _starting_points(effect, flights, flights.residual(x), beside)
+        out |= {Column(effect, "", Part.START, i): start for i, start in enumerate(own)}
+    return out

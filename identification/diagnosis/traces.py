@@ -16,8 +16,9 @@ from ..findings import CHANNELS, Signature
 from ..logs.table import Array, Names
 from ..motion.signals import Signals, in_body
 from ..motion.smoothing import mean_square
-from .discrepancy import heading_of, weight_and_torque
-from .regression import RegressedFlights, Setting, without
+from .coefficients import Setting, weight_and_torque, without
+from .discrepancy import heading_of
+from .regression import RegressedFlights
 
 # least shares for a channel to carry an effect: of its deviance, in the forces or in the torques,
 # and of its wrench, with a changed input

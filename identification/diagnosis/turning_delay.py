@@ -20,13 +20,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.optimize import fminbound
-from scipy.signal import detrend
 
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Array
 from ..motion.signals import Signals
-from .regression import moves_time
+from .coefficients import moves_time
 
 # Hz, of the commanded moments in the angular acceleration
 BAND_HZ = (1.0, 8.0)
@@ -132,11 +131,11 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> _Spectra:
     f = np.fft.rfftfreq(length, piece.period)
     band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
     x, y = (
-        np.fft.rfft(
-            detrend(sliding_window_view(z, length, axis=0)[:: length // 2], type="constant")
-            * np.hanning(length)
-        ).swapaxes(1, 2)[:, band]
+        np.fft.rfft((part - part.mean(axis=2, keepdims=True)) * np.hanning(length)).swapaxes(1, 2)[
+            :, band
+        ]
         for z in (moments, piece.angular_acceleration[:, :2])
+        for part in [sliding_window_view(z, length, axis=0)[:: length // 2]]
     )
     share = len(moments) / length / len(x)
     moment, turning = np.square(np.abs(x)), np.square(np.abs(y)) + 1e-300

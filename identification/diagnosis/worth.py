@@ -6,9 +6,10 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ..motion.smoothing import mean_square
+from .coefficients import Setting, without
 from .evidence import bounded_mode
 from .priors import prior_size
-from .regression import RegressedFlights, Setting, without
+from .regression import RegressedFlights
 from .row_nuisances import row_nuisances
 from .rows import Rows
 

@@ -12,6 +12,7 @@ rolls over, or a vehicle was switched on twice. Each group keeps its stamps in t
 
 from bisect import bisect_left
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -66,7 +67,7 @@ class ChannelGroup:
 
     def there(self, part: Columns) -> Mask:
         """Return the rows (N,) with all values of a section."""
-        return finite_rows(self.values(part))
+        return finite_rows(np.transpose([self.t, *map(self.columns.__getitem__, part.named)]))
 
     def has(self, part: Columns) -> bool:
         """Return whether a section's columns are there."""
@@ -159,7 +160,7 @@ def slerp(t: Array, attitude: Stream, longest: float = inf) -> Array:
 
 def scaled(part: Columns, values: Array) -> Array:
     """Return columns (N, k), with the section's signs and scale."""
-    return values * (part.signs or 1) * part.scale
+    return values * (np.array(part.signs or 1) * part.scale)
 
 
 def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) -> Array:
@@ -178,8 +179,8 @@ def in_kit_units(log_map: LogMap, section: str, part: Columns, values: Array) ->
     if isinstance(part, Battery):
         return values * unit * part.cells
     if isinstance(part, Sensor):
-        return values * unit @ BODY_TURNS[part.body or log_map.body].T
-    return values if section == "wrench" else values * unit @ WORLD_TURNS[log_map.world].T
+        return values @ (unit * BODY_TURNS[part.body or log_map.body].T)
+    return values if section == "wrench" else values @ (unit * WORLD_TURNS[log_map.world].T)
 
 
 def quaternions(part: Attitude, values: Array) -> Array:
@@ -367,9 +368,8 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> C
         notes.append(f"{left} row(s) without a time were left out")
     if len(raw) < 2:
         raise InputError(f"{where}: {len(raw)} time(s); expected at least two")
-    # a channel with a value in every row has one time for each value
-    full = any(np.isfinite(x).all() for n, x in samples.columns.items() if n not in clock.named)
-    if full and (even := _even_times(raw)) is not None:
+    others = [x for name, x in samples.columns.items() if name not in clock.named]
+    if (even := _even_times(raw, others)) is not None:
         rounded, raw = np.diff(np.unique(raw)).min(), even
         notes.append(
             f"column {clock.column}: rounded to {rounded:.3g} {unit}, with several rows a time; "
@@ -415,12 +415,17 @@ def rows_of(table: Table, columns: ArrayMap, log_map: LogMap, notes: Lines) -> C
     return samples
 
 
-def _even_times(raw: Array) -> SomeArray:
-    """Return even times (N,) of rows whose times (N,) were rounded; None: the rows are not even, or
-    a time repeats in fewer than a fifth of them.
+def _even_times(raw: Array, others: Sequence[Array]) -> SomeArray:
+    """Return even times (N,) of rows whose times (N,) were rounded; None: the rows are not even, a
+    time repeats in fewer than a fifth of them, whole rows repeat, or none of the ``others`` (N,)
+    has a value in every row, and so a time for each.
     """
     step = np.diff(raw)
     if not (step > 0.0).any() or (step < 0.0).any() or (step == 0.0).mean() < 0.2:
+        return None
+    moves = np.asarray(np.diff(others).any(axis=0))
+    repeat = moves.any() and not moves[step == 0.0].any()
+    if repeat or not np.isfinite(others).all(axis=1).any():
         return None
     rows = np.arange(len(raw))
     even = np.polynomial.Polynomial.fit(rows, raw, 1)(rows)

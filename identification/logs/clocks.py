@@ -21,10 +21,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, running_integral, second_difference
 from .evidence import GOOD
-from .flight_log import FlightLog, excerpt, with_rows
+from .flight_log import FlightLog, NotedLog, SomeVehicle, excerpt, with_rows
 from .inertial import (
     STILL,
     WINDOW,
@@ -36,7 +35,7 @@ from .inertial import (
     windows,
 )
 from .pose_delay import FARTHEST, LEAST, SURE, answer_to_noise, pose_delay
-from .table import Array, Data, Names, Pair
+from .table import Array, Data, Pair
 
 _COARSE = 0.01  # s, of the search's first steps
 _PARTS = 4  # of the flight; the scatter of their offsets is the uncertainty
@@ -44,7 +43,7 @@ _PARTS = 4  # of the flight; the scatter of their offsets is the uncertainty
 _Felt = Callable[[float, Array], Array]  # s of delay and windows (n,): a sensor's means (n, 3)
 
 
-def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Names]:
+def on_one_clock(log: FlightLog, vehicle: SomeVehicle) -> NotedLog:
     """Return a log with IMU, pose and rotor speeds on one clock, and a note on each offset.
 
     Inertial sensors and poses are moved by whole rows, rotor speeds by interpolation. An IMU beyond
@@ -60,7 +59,7 @@ def on_one_clock(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Na
     return log, (*of_imu, *of_rotors)
 
 
-def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Names]:
+def _with_imu_moved(log: FlightLog, vehicle: SomeVehicle) -> NotedLog:
     """Return a log with IMU and pose on one clock, and a note on an offset beyond 10 ms."""
     late, std, changes = _imu_delay(log)
     if not (changes or abs(late) > max(LEAST, SURE * std)):
@@ -88,7 +87,7 @@ def _with_imu_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog,
     return log, (_note(whose, late, std, f"{other}{rotors}", f"the {whose} was moved"),)
 
 
-def _with_rotors_moved(log: FlightLog, vehicle: Vehicle | None) -> tuple[FlightLog, Names]:
+def _with_rotors_moved(log: FlightLog, vehicle: SomeVehicle) -> NotedLog:
     """Return a log with rotor speeds on the clock of its pose, and a note on an offset beyond any
     flown vehicle's delay.
     """

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...runtime.yaml_file import read_yaml
-from .table import Data, Names
+from .table import Data, NamedTexts, Names, Texts
 
 WORDS: Data = read_yaml(Path(__file__).with_name("column_words.yaml"), "words")
 # by spelling; nothing for a unit without use in maps
-_UNITS: dict[str, str] = {
+_UNITS: NamedTexts = {
     word: unit for unit, spellings in WORDS["units"].items() for word in spellings
 }
 _PLAIN = "|".join(word for word in _UNITS if _UNITS[word] and re.fullmatch(r"\w+", word, re.A))
@@ -41,7 +41,7 @@ class Group:
     """Columns of one vector or of one set of motors."""
 
     columns: Names
-    key: str  # the common part of the names
+    key: str = ""  # the common part of the names
     unit: str = ""
     endings: Names = ()  # axes or numbers in the names, where known
 
@@ -51,7 +51,7 @@ class Group:
         return not self.endings or self.endings[0].isdigit()
 
 
-def take_apart(header: Sequence[str], units: Sequence[str] = ()) -> list[Name]:
+def take_apart(header: Texts, units: Texts = ()) -> list[Name]:
     """Return the columns' names, taken apart; ``units`` stand in a line behind the header."""
     out = []
     for i, column in enumerate(header):
@@ -77,7 +77,7 @@ def _bare(text: str) -> str:
     return text.strip(" []()").lower()
 
 
-def groups_of(names: Sequence[Name], endings: Sequence[str]) -> list[Group]:
+def groups_of(names: Sequence[Name], endings: Texts) -> list[Group]:
     """Return the groups of columns whose names differ in one of ``endings`` alone, in the order of
     the endings. An ending stands at the end, at the beginning, or between other words.
     """

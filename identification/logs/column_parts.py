@@ -203,8 +203,8 @@ def candidates(
             and len(np.unique(numbers.some((n.column,)))) > 10
             and not re.search(WORDS["not_measured"], n.base)
         )
-        for i in range(len(measured) - width + 1):  # adjacent columns
-            ways.append((Group(measured[i : i + width], ""), 0.0, ""))
+        adjacent = zip(*(measured[i:] for i in range(width)), strict=False)
+        ways += [(Group(columns), 0.0, "") for columns in adjacent]
     found = []
     for group, score, why in ways:
         strength, told = judge(group.columns) if len(numbers.rows(group.columns)[0]) else (0.0, "")

@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...dynamics.vehicle import Vehicle
 from ..motion.signals import LONGEST_GAP, SHORTEST_PIECE
 from ..motion.smoothing import (
     CUTOFFS,
@@ -35,7 +34,7 @@ from ..motion.smoothing import (
     turning,
     unbroken,
 )
-from .flight_log import FlightLog, excerpt
+from .flight_log import FlightLog, SomeVehicle, excerpt
 from .flight_phases import usual_thrust
 from .log_map import UNITS, Attitude
 from .readings import (
@@ -48,7 +47,7 @@ from .readings import (
     as_written,
     log_readings,
 )
-from .table import Array, ArrayPair, Pair, Rows, finite_rows, lengths, median_step
+from .table import Array, ArrayPair, Pair, Rows, SomeArray, finite_rows, lengths, median_step
 
 # Filters, and when a reading is certain.
 _FEWEST = 60  # samples in flight for a decision
@@ -118,11 +117,11 @@ class Evidence:
         self,
         t: Array,
         thrusts: Array,
-        position: Array | None = None,
-        attitude: Array | None = None,
-        gyro: Array | None = None,
-        along: Array | None = None,
-        vehicle: Vehicle | None = None,
+        position: SomeArray = None,
+        attitude: SomeArray = None,
+        gyro: SomeArray = None,
+        along: SomeArray = None,
+        vehicle: SomeVehicle = None,
         sides: Array = SIDES,
     ) -> None:
         self._t, self._position, self.attitude = t, position, attitude
@@ -143,7 +142,7 @@ class Evidence:
         self._moved = lru_cache(2)(self._balances)
 
     @classmethod
-    def of_log(cls, log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False) -> "Evidence":
+    def of_log(cls, log: FlightLog, vehicle: SomeVehicle, by_imu: bool = False) -> "Evidence":
         """Return the evidence of a log: by its pose, or by its IMU."""
         squares = log.rotor_speeds**2
         if by_imu:
@@ -194,11 +193,11 @@ class Evidence:
         """Return columns (m, k), low-passed as a trajectory's motion is."""
         return low_pass(x, CUTOFFS.convention_hz, self._period)
 
-    def _band(self, x: Array) -> Array:
-        """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k)."""
+    def _band(self, x: Array, rows: Rows | slice = slice(None)) -> Array:
+        """Return columns (m, k) in the bands of roll and pitch and of yaw, (m, 2, k), some rows."""
         # Below 1 Hz, steady moments of the air are larger than the torques of turning; above 4 Hz
         # (of yaw, where rotors do least, 3 Hz), the pose's noise is
-        low, high, yaw = (low_pass(x, hz, self._period) for hz in (1.0, 4.0, 3.0))
+        low, high, yaw = (low_pass(x, hz, self._period)[rows] for hz in (1.0, 4.0, 3.0))
         return np.stack([high - low, yaw - low], axis=1)
 
     @cached_property
@@ -248,8 +247,9 @@ class Evidence:
             matrices, w = turning(smooth, self._period)
         axes = self._slow(self._driving[:, 9:] * matrices.reshape(-1, 9))
         products = np.einsum("ni,nj->nij", w, w).reshape(-1, 9)
-        turns = self._band(np.column_stack([w, derivative(w, self._period), products]))
-        return axes[self._compared].reshape(-1, 3, 3), turns[self._compared]
+        turns = np.column_stack([w, derivative(w, self._period), products])
+        rows = self._compared
+        return axes[rows].reshape(-1, 3, 3), self._band(turns, rows)
 
     def _needed(self, along: Array, reading: Convention) -> Array:
         """Return the force ``along`` the thrust axis (n,) above the torques in Nm of the motion, in
@@ -346,7 +346,7 @@ class RankedFits:
     """
 
     def __init__(
-        self, fits: Iterable[Fit], left: str = "horizontal acceleration is left by the tilt"
+        self, fits: Iterable[Fit], left: str = "horizontal acceleration is not due to the tilt"
     ) -> None:
         self.ranked = sorted(fits, key=lambda fit: -fit.score)
         self.left = left
@@ -390,7 +390,7 @@ class RankedFits:
         other, lead = self.other(name)
         why = f"{self.fit.horizontal:.0%} of the {self.left}"
         if other is not None and lead > 0.0:
-            why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
+            why += f"; the log likelihood of {other} is {lead:.3g} lower"
         return attrgetter(name)(self.best), self.certain(name), why
 
 
@@ -401,7 +401,7 @@ def log_ranking(evidence: Evidence) -> RankedFits:
 
 
 def remedies(
-    log: FlightLog, vehicle: Vehicle | None, by_imu: bool = False
+    log: FlightLog, vehicle: SomeVehicle, by_imu: bool = False
 ) -> tuple[list[Convention], bool]:
     """Return the equally good readings of a contradictory log, and whether each of them, applied,
     leaves a consistent log. No reading: the log is consistent as declared.

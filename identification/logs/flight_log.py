@@ -155,6 +155,7 @@ class FlightLog:
 
 Logs = Sequence[FlightLog]
 SomeVehicle = Vehicle | None  # None: unknown
+NotedLog = tuple[FlightLog, Names]  # with doubts
 
 
 def flown_vehicle(vehicle: SomeVehicle, name: str) -> SomeVehicle:

@@ -14,10 +14,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import resampled, running_integral, second_difference
 from .evidence import GOOD, likelihood, remedies
-from .flight_log import ACCELEROMETER, GYRO, FlightLog, excerpt
+from .flight_log import ACCELEROMETER, GYRO, FlightLog, NotedLog, SomeVehicle, excerpt
 from .readings import (
     ACCELEROMETER_READINGS,
     AS_DECLARED,
@@ -27,7 +26,7 @@ from .readings import (
     SensorReading,
     applied,
 )
-from .table import Array, Data, Names, finite_rows, lengths
+from .table import Array, Data, Lines, SomeArray, finite_rows, lengths
 
 # How inertial sensors are compared.
 WINDOW = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
@@ -38,7 +37,7 @@ _STRONGEST = 300.0  # m/s2 of specific force, above all racers and most sensors'
 _BY_GRAVITY = [reading for reading in ACCELEROMETER_READINGS if not reading.lacks_gravity]
 
 
-def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[FlightLog, Names]:
+def check_inertial(log: FlightLog, vehicle: SomeVehicle = None) -> NotedLog:
     """Return a log without the inertial sensors contradicting its pose, and a note on each. They
     stay where they agree with the rotors, and the pose in another convention with all of them: the
     note is on the pose.
@@ -60,11 +59,11 @@ def check_inertial(log: FlightLog, vehicle: Vehicle | None = None) -> tuple[Flig
     return checked, notes
 
 
-def _agreeing(log: FlightLog, gravity: float) -> tuple[FlightLog, Names]:
+def _agreeing(log: FlightLog, gravity: float) -> NotedLog:
     """Return a log without the inertial sensors contradicting its pose, and a note on each. Windows
     of a long flight are asked.
     """
-    notes: list[str] = []
+    notes: Lines = []
     part = excerpt(log)
     seen = np.flatnonzero(part.valid)
     pose = part.t[seen], Rotation.from_quat(part.quaternion[seen], scalar_first=True)
@@ -191,7 +190,7 @@ def _force_shares(
     attitude: Rotation,
     position: Array,
     gravity: float,
-) -> tuple[list[float] | None, Array | None]:
+) -> tuple[list[float] | None, SomeArray]:
     """Return the shares of acceleration and gravity left by an accelerometer, as declared and by
     each reading; None: too little is measured. For an acceleration in world axes return the rest
     (3,) of the specific force, too, else None.

@@ -66,7 +66,7 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.forms import STRICT, Number, Positive, checked, expected
 from ...runtime.yaml_file import read_yaml
 from .column_names import WORDS, unit_spelled
-from .table import Array, ArrayMap, Data, Lines, NamedNumbers, Names, Pair, Wanted
+from .table import Array, ArrayMap, Data, Lines, NamedNumbers, NamedTexts, Names, Pair, Wanted
 from .what_flew import ORDERS, Order, rotor_order
 
 _T = TypeVar("_T")
@@ -76,7 +76,7 @@ MAPS = Path(__file__).parent / "maps"  # the kit's own maps
 OWN_MAP = "windwrench"  # of this kit's own columns
 UNKNOWN = "?"  # a field that a person must choose
 
-WORLDS: dict[str, str] = WORDS["worlds"]
+WORLDS: NamedTexts = WORDS["worlds"]
 UNITS: dict[str, NamedNumbers] = WORDS["factors"]
 COMMAND_UNITS: dict[str, Pair | None] = {
     unit: ends and (ends[0], ends[1]) for unit, ends in WORDS["commands"].items()

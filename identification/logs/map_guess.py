@@ -17,7 +17,6 @@ from itertools import permutations, product
 
 import numpy as np
 
-from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from .channels import BODY_TURNS
@@ -32,7 +31,7 @@ from .column_parts import (
     named_columns,
 )
 from .evidence import GOOD, GOOD_TORQUE, Evidence, Fit, RankedFits, likelihood
-from .flight_log import LONGEST
+from .flight_log import LONGEST, SomeVehicle
 from .inertial import gyro_shares
 from .log_map import (
     COMMAND_UNITS,
@@ -49,7 +48,7 @@ from .log_map import (
 )
 from .magnitudes import DOUBTFUL, likely_unit, motor_unit, within
 from .readings import DECLARED, OTHER, ROTORS, SensorReading, rotations, table_readings
-from .table import Array, ArrayMap, Data, NamedArrays, Names, Table, lengths
+from .table import Array, ArrayMap, Data, NamedArrays, NamedTexts, Names, Table, lengths
 from .what_flew import ORDERS, Order, more_rotors, order_names, order_words
 
 _Choice = tuple[str, bool, str]  # value, whether it is certain, and why
@@ -107,7 +106,7 @@ class Guess:
         return tuple(reason for reason in self.reasons if not reason.certain)
 
 
-def guess_map(table: Table, vehicle: Vehicle | None = None) -> Guess:
+def guess_map(table: Table, vehicle: SomeVehicle = None) -> Guess:
     """Return a guessed map of a table.
 
     Args:
@@ -169,14 +168,14 @@ def _explained(ranking: RankedFits | None) -> float:
 class _Guessing:
     """The state of a guess: the columns of each part, the sections of the map, and reasons."""
 
-    def __init__(self, table: Table, vehicle: Vehicle | None) -> None:
+    def __init__(self, table: Table, vehicle: SomeVehicle) -> None:
         self.table, self.vehicle = table, vehicle
         self.sections: Data = {}
         self.reasons: list[_Reason] = []
         self.ranked: dict[str, list[ColumnCandidate]] = {}  # of each part
         self.parts: dict[str, Group] = {}  # the first of the candidates, if likely
         self.unnamed: set[str] = set()  # sections without telling names
-        self.further: dict[str, str] = {}  # words on more than four motors, by part
+        self.further: NamedTexts = {}  # words on more than four motors, by part
         self.ranking: RankedFits | None = None  # of the pose
         names = take_apart(table.header, table.units)
         self.data = _numbers_of(table, names)
@@ -229,7 +228,7 @@ class _Guessing:
 
     def missing(self) -> list[_Reason]:
         """Return the fields missing for a flight log."""
-        lacks: dict[str, str] = {}
+        lacks: NamedTexts = {}
         if self.clock is None:
             lacks["time"] = "no column looks like a time; expected one such as t, time or timestamp"
             for name in named_alone(self.free, "time"):
@@ -347,7 +346,7 @@ class _Guessing:
         attitude = self.parts.get("attitude")
         if attitude is None or len(attitude.columns) == 3:
             return 0.0, ""
-        ranking = self.pose_fits(Group(columns, ""), attitude)
+        ranking = self.pose_fits(Group(columns), attitude)
         return _explained(ranking), "their acceleration follows the tilt"
 
     def pose(self, place: Group, group: Group) -> None:
@@ -417,7 +416,7 @@ class _Guessing:
             )
             for way, left in zip(_GYROS, shares, strict=False)
         ]
-        return RankedFits(fits, "attitude's rate is left unexplained") if fits else None
+        return RankedFits(fits, "attitude's rate stays unexplained") if fits else None
 
     def turns_alike(self, columns: Names) -> Verdict:
         """Return the share of the pose's turns in three columns, at most 1; 0 where they turn
@@ -505,8 +504,8 @@ class _Guessing:
         is_sure = left <= GOOD_TORQUE and ranking.certain("rotors") and turns
         if is_sure or (names and left <= 0.9 and lead >= 1.0):
             why = (
-                f"{(*names, order_words(order))[0]}: {left:.0%} of the angular acceleration is "
-                f"left, and the next best is less likely by a log-likelihood ratio of {lead:.3g}"
+                f"{(*names, order_words(order))[0]}: {left:.0%} of the angular acceleration "
+                f"stays unexplained; the log likelihood of the next best is {lead:.3g} lower"
             )
             return order, is_sure, why
         why = f"{hint}: no order is much likelier than all others"
@@ -517,8 +516,8 @@ class _Guessing:
         if plus.fit.torque <= GOOD_TORQUE and turns:
             placed = order_words(plus.best.motors, ("left", "rear", "right", "front"))
             why = (
-                f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration is left; "
-                "expected a vehicle file with these rotor_positions"
+                f"a plus, {placed}: {plus.fit.torque:.0%} of the angular acceleration stays "
+                "unexplained; expected a vehicle file with these rotor_positions"
             )
         return ORDERS[hint], False, why
 

@@ -198,7 +198,7 @@ def sections_of(
             said += _command_notes(path, log_map, part, stream)
         elif isinstance(part, Battery) and part.late:
             streams[name] = replace(stream, t=stream.t - part.late)
-            said.append(f"battery voltage put {part.late:g} s sooner, by which it is logged late")
+            said.append(f"battery voltage moved {part.late:g} s earlier: the log delays it")
     if log_map.position is None:
         absent = [name for name in _IMU if readable(streams.get(name)) is None]
         if absent and (log_map.rows != "whole" or (poses and not log_map.is_own)):
@@ -600,7 +600,7 @@ def _cleaned(path: Path, streams: Streams, notes: Lines) -> Streams:
             values = np.where(finite_rows(values)[:, None], values, nan)
         if section == "position" or (np.isfinite(values).any() and count > 1):
             made[section] = Stream(name, stream.t, values)
-        elif section == "battery" and not (values > 0.0).any():
+        elif section == "battery" and not (stream.values > 0.0).any():
             notes.append(f"{name}: no positive voltage; left out")
     return made
 

@@ -15,12 +15,12 @@ The answer tells more. No loop answers noise before the pose was measured. Rotor
 ahead of the noise's row prove a late pose, and no latency of the vehicle does the same.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.vehicle import Vehicle
 from ..motion.smoothing import (
     high_pass,
     resampled,
@@ -31,7 +31,7 @@ from ..motion.smoothing import (
     unbroken,
 )
 from .evidence import SIDES
-from .flight_log import FlightLog, excerpt
+from .flight_log import FlightLog, SomeVehicle, excerpt
 from .table import Array, Pair, Rows, median_step
 
 FARTHEST = 0.3  # s, of the search
@@ -77,7 +77,7 @@ class _Response(NamedTuple):
         return float(_DELAYS[self.explained(_DELAYS).argmax()])
 
 
-def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
+def pose_delay(log: FlightLog, vehicle: SomeVehicle) -> _PoseDelay | None:
     """Return the delay of a log's pose behind its rotor speeds; None: the flight does not show one.
 
     Args:
@@ -85,13 +85,15 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
         vehicle: as declared; None: rotors on one side turn the body to the other.
     """
     log = excerpt(log)
+    if log.valid.sum() < _FEWEST:
+        return None
+    segments, response_of = _spectra(log, vehicle)
     late = 0.0
     for _ in range(10):  # a window over delayed signals cuts the two of them differently
-        segments = _segments(log, vehicle, late)
-        if segments is None:
+        both = segments(late)
+        if len(both[0]) < _FEWEST:
             return None
-        omega, noise, *both = segments
-        response = _response(*segments)
+        response = response_of(*both)
         step = response.likeliest()
         late = float(np.clip(late + step, -FARTHEST, FARTHEST))
         if step == 0.0:
@@ -105,7 +107,7 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     # gusts answered by the loop leave a response of another shape, and turn its phase by as much
     misfit = np.sqrt(left / (response.omega**2 * whole).sum())
     parts = zip(*(np.array_split(x, _PARTS) for x in both), strict=True)
-    scatter = np.std([_response(omega, noise, *part).likeliest() for part in parts])
+    scatter = np.std([response_of(*part).likeliest() for part in parts])
     std = float(np.hypot(scatter / np.sqrt(_PARTS), misfit))
     # s: rotor speeds of flown vehicles act by up to 0.04 later (a flight loop falls over more), and
     # those that pass a filter of their own by up to 0.03 earlier
@@ -118,70 +120,70 @@ def pose_delay(log: FlightLog, vehicle: Vehicle | None) -> _PoseDelay | None:
     return _PoseDelay(late, std, bool(best - as_good > 9.0 * scale))
 
 
-def _response(omega: Array, noise: Array, moment: Spectra, turning: Spectra) -> _Response:
-    """Return the frequency response of some of the segments."""
-    xx, yy = ((abs(z) ** 2).mean(axis=0) + 1e-300 for z in (moment, turning))
-    xy = (np.conj(moment) * turning).mean(axis=0)
-    left = np.maximum(yy - abs(xy) ** 2 / xx, 1e-12 * yy)
-    # a half overlapping segment counts for 0.55 independent ones
-    variance = left / (1.1 * len(moment)) + noise
-    return _Response(omega, xy / xx, xx / variance)
-
-
-def _segments(
-    log: FlightLog, vehicle: Vehicle | None, late: float
-) -> tuple[Array, Array, Spectra, Spectra] | None:
-    """Return frequencies (f, 1) in rad/s, the power (f, 2) of the pose's noise, and transforms
-    (n, f, 2) of moments and of turns in segments of a flight with the pose moved ``late`` s back;
-    None: the segments are too few.
+def _spectra(
+    log: FlightLog, vehicle: SomeVehicle
+) -> tuple[Callable[[float], Spectra], Callable[..., _Response]]:
+    """Return two functions: the transforms (2, n, f, 2) of moments and of turns in segments of a
+    flight with the pose moved so many s back; and the frequency response of some of the segments.
     """
     rows = np.flatnonzero(log.valid)
-    if len(rows) < _FEWEST:
-        return None
     step = median_step(log.t[rows])
     period = max(0.01, log.period)
-    count = round(_SEGMENT / period)
+    count = max(2, round(_SEGMENT / period))
     inertia = np.eye(3) if vehicle is None else vehicle.inertia
     window = np.hanning(count)[:, None]
-    moments = _moments(log, vehicle)
-    transforms, noises = [], []
+    moments = running_integral(_moments(log, vehicle), log.t)
+    turns, noises = [], [0.0]
     for piece in unbroken(log.t, rows, max(0.1, 3.5 * step), 60, _SEGMENT):
-        t, angles = log.t[piece], _angles(log, piece)
+        angles = _angles(log, piece)
         # above a quarter of the poses' rate is noise alone
         noises.append(robust_std(high_pass(angles, 0.25)))
-        first = max(t[0], log.t[0] + late) + period
-        at = np.arange(first, min(t[-1], log.t[-1] + late) - period, period)
-        turn = _means(at, period, t, angles)
-        w = (turn[2:] - turn[:-2]) / (2.0 * period)
-        alpha = np.diff(turn, n=2, axis=0) / period**2
-        needed = (alpha @ inertia + np.cross(w, w @ inertia))[:, :2]
-        both = np.stack([_means(at[1:-1] - late, period, log.t, moments), needed])
-        for begin in range(0, len(needed) - count + 1, count // 2):
-            part = both[:, begin : begin + count]
-            part = window * (part - part.mean(axis=1, keepdims=True))
-            transforms.append(np.fft.rfft(part, axis=1))
-    if len(transforms) < _FEWEST:
-        return None
+        turns.append((log.t[piece], running_integral(angles, log.t[piece])))
     frequency = np.fft.rfftfreq(count, period).astype(float)
     band = (frequency >= 0.8) & (frequency <= min(10.0, 0.4 / step))
     frequency = frequency[band, None]
+    omega = 2.0 * np.pi * frequency
     # white noise of the angles, through the mean over a period and two differences
-    passed = np.sinc(frequency * period) * (2.0 * np.sin(np.pi * frequency * period)) ** 2
-    noise = (passed / period**2 * np.mean(noises) * np.diag(inertia)[:2]) ** 2
+    passed = np.sinc(frequency * period) * (2.0 * np.sin(0.5 * omega * period)) ** 2
+    mean = sum(noises) / max(1, len(turns))
+    noise = (passed / period**2 * mean * np.diag(inertia)[:2]) ** 2
     noise *= step / period * (window**2).sum()
-    moment, turning = np.array(transforms)[:, :, band].swapaxes(0, 1)
-    return 2.0 * np.pi * frequency, noise, moment, turning
+
+    def segments(late: float) -> Spectra:
+        transforms = []
+        for t, sums in turns:
+            first = max(t[0], log.t[0] + late) + period
+            at = np.arange(first, min(t[-1], log.t[-1] + late) - period, period)
+            turn = _means(at, period, t, sums)
+            w = (turn[2:] - turn[:-2]) / (2.0 * period)
+            alpha = np.diff(turn, n=2, axis=0) / period**2
+            needed = (alpha @ inertia + np.cross(w, w @ inertia))[:, :2]
+            both = np.stack([_means(at[1:-1] - late, period, log.t, moments), needed])
+            for begin in range(0, len(needed) - count + 1, count // 2):
+                part = both[:, begin : begin + count]
+                part = window * (part - part.mean(axis=1, keepdims=True))
+                transforms.append(np.fft.rfft(part, axis=1)[:, band])
+        return np.reshape(transforms, (len(transforms), 2, len(frequency), 2)).swapaxes(0, 1)
+
+    def response(moment: Spectra, turning: Spectra) -> _Response:
+        xx, yy = ((abs(z) ** 2).mean(axis=0) + 1e-300 for z in (moment, turning))
+        xy = (np.conj(moment) * turning).mean(axis=0)
+        left = np.maximum(yy - abs(xy) ** 2 / xx, 1e-12 * yy)
+        # a half overlapping segment counts for 0.55 independent ones
+        variance = left / (1.1 * len(moment)) + noise
+        return _Response(omega, xy / xx, xx / variance)
+
+    return segments, response
 
 
-def _means(at: Array, width: float, t: Array, x: Array) -> Array:
-    """Return means (m, k) over ``width`` s around times (m,) of columns (n, k), linear between
-    times (n,).
+def _means(at: Array, width: float, t: Array, sums: Array) -> Array:
+    """Return means (m, k) over ``width`` s around times (m,) of columns by their integrals (n, k)
+    over times (n,).
     """
-    sums = running_integral(x, t)
     return (resampled(at + 0.5 * width, t, sums) - resampled(at - 0.5 * width, t, sums)) / width
 
 
-def _moments(log: FlightLog, vehicle: Vehicle | None) -> Array:
+def _moments(log: FlightLog, vehicle: SomeVehicle) -> Array:
     """Return the rotors' roll and pitch moments (N, 2); without a vehicle, in no unit."""
     return log.rotor_speeds**2 @ (SIDES if vehicle is None else vehicle.mixing[1:3]).T
 
@@ -191,7 +193,7 @@ def _angles(log: FlightLog, piece: Rows) -> Array:
     return np.vstack([np.zeros(3), turned(log.quaternion[piece])])
 
 
-def answer_to_noise(log: FlightLog, vehicle: Vehicle | None, late: float) -> Pair | None:
+def answer_to_noise(log: FlightLog, vehicle: SomeVehicle, late: float) -> Pair | None:
     """Return by how much (s) the rotor speeds answer the pose's noise ahead of its rows, and the
     width (s) of the differences. None: there is no answer, or the pose shows no white noise.
 

@@ -18,7 +18,7 @@ from ..motion.smoothing import resampled
 from .channels import quaternions, scaled
 from .flight_log import FlightLog
 from .log_map import SENSES, UNITS, Attitude
-from .table import Array, Data, Mask, Names, finite_rows, lengths
+from .table import Array, Data, Lines, Mask, NamedTexts, Names, finite_rows, lengths
 from .what_flew import ORDERS, Order, order_names
 
 _I = np.eye(3)
@@ -55,7 +55,7 @@ _USUAL_FRAMES = tuple(map(_frames, _STATED["frames"]))
 MAP_FRAMES = tuple(frames for frames in _USUAL_FRAMES if frames.map_world)  # with names in a map
 
 
-_FACTS: dict[str, str] = _STATED["positions"]
+_FACTS: NamedTexts = _STATED["positions"]
 _ALONG = [  # the 47 other directions of px, py, pz along axes of the attitude's world
     " ".join(map("".join, zip(signs, axes, strict=True)))
     for axes, signs in product(permutations("xyz"), product(("", "-"), repeat=3))
@@ -136,10 +136,10 @@ class Convention:
                 f"{seconds} {sooner}"
             )
         if self.length != "m":
-            name = {"mm": "milli", "cm": "centi"}[self.length]
+            name = {"mm": "millimetres", "cm": "centimetres", "ft": "feet"}[self.length]
             words.append(
-                f"px, py, pz look like {name}metres; expected metres: divide them by "
-                f"{1.0 / UNITS['position'][self.length]:.0f}"
+                f"px, py, pz look like {name}; expected metres: divide them by "
+                f"{1.0 / UNITS['position'][self.length]:.4g}"
             )
         words += self._pose_words()
         if self.rotors != ROTORS:
@@ -161,7 +161,7 @@ class Convention:
             )
         return "; ".join(words)
 
-    def _pose_words(self) -> list[str]:
+    def _pose_words(self) -> Lines:
         orders = {
             "xyzw": "the quaternion is scalar last",
             "zwxy": "the quaternion is scalar first under the headers of scalar last",
@@ -258,7 +258,7 @@ def log_readings(has_pose: bool) -> list[Convention]:
         attitudes = _quaternions(("wxyz", "xyzw", "zwxy"))
         others = _each(attitude=attitudes, frames=_USUAL_FRAMES)[1:]
         others.append(Convention(attitudes[1], _frames(_STATED["mirrored"])))
-        others += _each(frames=_POSITIONS) + _each(length=("cm", "mm"))
+        others += _each(frames=_POSITIONS) + _each(length=("cm", "mm", "ft"))
     others = [replace(reading, unlikely=OTHER) for reading in others]
     return [DECLARED, *_weighed(others), *ROTOR_READINGS]
 

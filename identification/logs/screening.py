@@ -20,19 +20,20 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.inertial_signals import imu_rows, inertial_pieces, reads_imu
-from ..motion.signals import SHORTEST_PIECE, pose_pieces
-from ..motion.smoothing import CUTOFFS, low_pass, runs_of, turn_between
+from ..motion.signals import SHORTEST_PIECE, longest_step, pose_pieces
+from ..motion.smoothing import CUTOFFS, low_pass, runs_of
 from .evidence import remedies
-from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, serves
+from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, NotedLog, SomeVehicle, serves
 from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import DOUBTFUL, interpolated, motor_doubts, rotor_doubt, time_doubt, within
-from .table import Array, Mask, Names, lengths, median_step
+from .table import Array, Mask, lengths, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
 _LEAST_IMU_HZ = 45.0  # without a pose: a quadrotor turns within a tenth of a second
 _JUMP = 0.3  # s: a step so long without a move is a jump of the clock
+_MANY_LEAPS = 0.05  # share of the steps
 _STILL = 0.5  # s of a still channel; a busy link repeats a few samples
 
 
@@ -57,7 +58,7 @@ _Findings = Iterable[str]
 
 def screen_log(
     log: FlightLog, vehicle: Vehicle, least_seconds: float | None = LEAST_SECONDS
-) -> tuple[FlightLog, Names]:
+) -> NotedLog:
     """Return a log for a filter, and doubts, or refuse the log.
 
     Of equal poses to the last digit only the first is valid in the returned log: the others are no
@@ -114,7 +115,7 @@ def screen_log(
     return log, tuple(notes)
 
 
-def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
+def convention_doubt(log: FlightLog, vehicle: SomeVehicle) -> str:
     """Return the contradiction between a log's motion and its rotors, with the advice that leaves a
     consistent log; empty: none, or nothing to tell from. An estimate is refused for all but a
     delay.
@@ -126,7 +127,7 @@ def convention_doubt(log: FlightLog, vehicle: Vehicle | None) -> str:
     by_imu = reads_imu(log)
     if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
         return ""
-    advice, mends = remedies(log, vehicle, by_imu)
+    advice, mends = remedies(log if by_imu else _without_leaps(log), vehicle, by_imu)
     says = "; or ".join(dict.fromkeys(reading.says for reading in advice))
     if all(reading.late and not replace(reading, late=0.0).says for reading in advice):
         return _Fault(says)
@@ -151,7 +152,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
             f"has motor commands and no rotor speeds, and the vehicle {vehicle.name} states no "
             "motor_curve; expected one, to turn commands into thrust"
         )
-    if log.vehicle and log.vehicle != vehicle.name:
+    # ``identify`` gives a preset's flights a vehicle of their own
+    if log.vehicle not in ("", vehicle.name) and not vehicle.status.coefficients:
         yield _Note(
             f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
         )
@@ -178,15 +180,15 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
             f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
             f"{vehicle.name}: is it this vehicle, and did it fly?"
         )
+    times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
+    if doubt := time_doubt(median_step(times)):
+        yield _Refused(doubt)
     what, least = ("motor commands", FORCE_HZ) if log.commanded else ("rotor speeds", TORQUE_HZ)
     if not serves(log.motor_rate, least):
         yield _Needed(
             f"{what} come {log.motor_rate:.3g} times a second; expected at least {least:g}: what "
             "the rotors do between them is not known"
         )
-    times = log.t if by_imu or log.valid.sum() < 2 else log.t[log.valid]
-    if doubt := time_doubt(median_step(times)):
-        yield _Refused(doubt)
     carried = carrying((speeds**2).max(axis=1))
     for i, speed in enumerate(speeds.T):
         if stopped := _stretches((speed == 0.0) & carried, log.t, 0.3):
@@ -283,20 +285,38 @@ def _uneven_steps(log: FlightLog) -> _Findings:
         yield _Note(f"time steps are uneven: {words}")
 
 
+def _moves(log: FlightLog) -> tuple[Array, Array, Mask, Mask]:
+    """Return the pose's moves (m) and turns (rad) from row to row, and masks of both beyond a
+    quadrotor's speed.
+    """
+    q, step = log.quaternion[log.valid], np.diff(log.t[log.valid])
+    way = lengths(np.diff(log.position[log.valid], axis=0))
+    angle = 2.0 * np.arccos(np.minimum(abs(np.einsum("ni,ni->n", q[:-1], q[1:])), 1.0))
+    # m and rad, and m/s and rad/s over the step
+    return way, angle, way > 0.3 + 20.0 * step, angle > 0.8 + 60.0 * step
+
+
+def _without_leaps(log: FlightLog) -> FlightLog:
+    """Return a log without the poses around its leaps: a leap is no acceleration, and tells no
+    convention. Many leaps are of another unit.
+    """
+    leaps = np.logical_or(*_moves(log)[2:])
+    at = log.t[log.valid][1:][leaps & (leaps.mean() <= _MANY_LEAPS)]
+    reach = longest_step(log)
+    near = np.searchsorted(at, log.t - reach) < np.searchsorted(at, log.t + reach)
+    return replace(log, valid=log.valid & ~near)
+
+
 def _steps(log: FlightLog) -> _Findings:
     """Check for leaps of the pose beyond a quadrotor's speed, and for jumps of the clock."""
-    seen = np.flatnonzero(log.valid)
-    t, position, q = log.t[seen], log.position[seen], log.quaternion[seen]
+    t, position = log.t[log.valid], log.position[log.valid]
     step = np.diff(t)
-    way = lengths(np.diff(position, axis=0))
-    angle = lengths(turn_between(q[:-1], q[1:]))
-    # m and rad, and m/s and rad/s over the step
-    far, turned = way > 0.3 + 20.0 * step, angle > 0.8 + 60.0 * step
+    way, angle, far, turned = _moves(log)
     leaps = far | turned
     if leaps.any():
         first = leaps.argmax()
         what = f"{way[first]:.3g} m" if far[first] else f"{np.degrees(angle[first]):.0f} degrees"
-        units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
+        units = ": are px, py, pz in metres?" if far.mean() > _MANY_LEAPS else ""
         # with more leaps, the rest counts for nothing
         kind = _Refused if leaps.mean() > 0.25 else _Fault
         yield kind(
@@ -370,11 +390,10 @@ def _still(name: str, t: Array, rows: Mask, x: Array, own: list[int], names: str
     """
     still = rows & ~np.diff(x[:, own], axis=0, prepend=np.nan).any(axis=1)
     sisters = np.delete(x, own, axis=1)
-    changes = (np.diff(sisters, axis=0, prepend=sisters[:1]) != 0.0).cumsum(axis=0)
     for first, end in runs_of(still):
         lasts = t[end - 1] - t[first] >= _STILL
         # of equally often changing channels, one without a change in 20 has a chance of exp(-20)
-        if lasts and (changes[end - 1] - changes[first]).min() < 20:
+        if lasts and np.count_nonzero(np.diff(sisters[first:end], axis=0), axis=0).min() < 20:
             still[first:end] = False
     if stretches := _stretches(still, t, _STILL):
         yield _Note(

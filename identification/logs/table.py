@@ -24,6 +24,7 @@ NamedArrays = dict[str, Array]
 ArrayMap = Mapping[str, Array]
 NamedNumbers = dict[str, float]
 ArrayPair = tuple[Array, Array]
+NamedTexts = dict[str, str]
 Data = dict[str, Any]  # plain values by name
 Texts = Sequence[str]
 Lines = list[str]

@@ -121,18 +121,17 @@ def _write_matlab(path: Path, data: BinaryIO, made: BinaryIO) -> None:
         InputError: the file is of version 7.3 and h5py is not installed.
         ValueError: the file is no MATLAB file, is spoiled, or unpacks to too much.
     """
-    if data.read(10) == b"MATLAB 7.3" and find_spec("h5py") is None:
+    if data.read(10) == b"MATLAB 7.3" and not find_spec("h5py"):
         raise InputError(
             f"{path}: is MATLAB's version 7.3; expected version 7, as save('flight.mat', '-v7') "
             "writes, or h5py installed"
         )
     program = str(Path(__file__).with_name("matlab_arrays.py"))
     ran = subprocess.run(
-        [sys.executable, "-P", program, str(LIMITS.arrays), str(7 * 2**27)],  # bytes
+        [sys.executable, "-P", program, str(LIMITS.arrays), str(7 * LIMITS.arrays // 4)],
         stdin=data,
         stdout=made,
         stderr=PIPE,
-        check=False,
         # threads of linear algebra would take the file's share of memory
         env={**os.environ, **SINGLE_THREADED},
     )

@@ -445,7 +445,7 @@ def _header(path: Path, head: Lines, layout: _TextLayout, full: int) -> tuple[in
     before the first ``full`` one have empty fields.
 
     Raises:
-        InputError: the rows have twice as many fields as a line of names before them.
+        InputError: the rows have up to twice as many fields as a line of names before them.
     """
     width = len(layout.fields(head[full]))
     header, first = None, full
@@ -454,10 +454,9 @@ def _header(path: Path, head: Lines, layout: _TextLayout, full: int) -> tuple[in
         count = len(fields)
         empty, numbers = _counts(layout, fields)
         named = count - empty - numbers
-        if 2 * count == width and named == count and i == first - 1:
+        if 3 * count < 2 * width <= 4 * count and named == count and i == first - 1:
             raise InputError(
-                f"{path}: line {first + 1} has {width} fields, twice as many as the header; "
-                f"{_DECIMAL_COMMA}"
+                f"{path}: line {first + 1} has {width} fields, the header {count}; {_DECIMAL_COMMA}"
             )
         if count >= width - 1 and named >= max(2, 0.8 * count):
             is_units_line = header is None and sum(map(is_unit, fields)) >= 0.7 * count

@@ -17,7 +17,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError, unknown_name
 from .column_names import WORDS
-from .table import ArrayMap, Names, Pair, Table, finite_rows
+from .table import ArrayMap, Lines, Names, Pair, Table, Texts, finite_rows
 
 Order = tuple[int, ...]  # four
 
@@ -57,7 +57,7 @@ def order_words(order: Order, named: Names = PLACES) -> str:
     return f"motors {', '.join(f'{motor} {place}' for motor, place in places)}"
 
 
-def order_names(order: Order) -> list[str]:
+def order_names(order: Order) -> Lines:
     """Return the names of an order, if any."""
     return [name for name, known in ORDERS.items() if known == order]
 
@@ -133,7 +133,7 @@ def more_rotors(columns: Names, source: Table | ArrayMap, are_speeds: bool = Fal
     return f"{len(turning)} rotors turn ({', '.join(turning)}); expected the four of a quadrotor"
 
 
-def _numbered_on(columns: Names, others: Sequence[str]) -> list[str]:
+def _numbered_on(columns: Names, others: Texts) -> Lines:
     """Return the other columns with the next numbers up in the four columns' names."""
     for found in zip(*(re.finditer(r"\d+", name) for name in columns), strict=False):
         numbers = {match[0] for match in found}

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -157,11 +158,10 @@ def power_spectrum(x: Array, period: float, length: int) -> tuple[Array, Array]:
     (1967), 70-73), without their means.
     """
     length = min(length, len(x))
-    begins = range(0, len(x) - length + 1, length - length // 2)
-    parts = np.array([x[i : i + length] for i in begins])
-    window = np.hanning(length + 1)[:-1, None]
-    parts = window * (parts - parts.mean(axis=1, keepdims=True))
-    power = 2.0 * period * mean_square(np.abs(np.fft.rfft(parts, axis=1))) / np.sum(window**2)
+    parts = sliding_window_view(x, length, axis=0)[:: length - length // 2]
+    window = np.hanning(length + 1)[:-1]
+    parts = window * (parts - parts.mean(axis=-1, keepdims=True))
+    power = 2.0 * period * mean_square(np.abs(np.fft.rfft(parts))).T / np.sum(window**2)
     power[[0, -1] if length % 2 == 0 else 0] /= 2.0
     return np.arange(length // 2 + 1) / (length * period), power
 

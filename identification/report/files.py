@@ -4,15 +4,15 @@
 
 import json
 import shlex
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from pathlib import Path
 
 from ... import __version__
 from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.page_files import write_text
 from ...runtime.plain_values import as_text, plain
-from ..findings import Diagnosis, Errors
-from ..logs.table import Data, NamedNumbers
+from ..findings import Diagnosis
+from ..logs.table import Data
 from .headline import headline
 from .page import page_file, report_page
 
@@ -31,6 +31,13 @@ _AS_FOUND = (
     "test_logs",
     "seconds",
     "cutoff_hz",
+)
+# names of the fields of ``Errors`` there, in order
+_ERRORS = (
+    "force_rms_N",
+    "torque_rms_Nm",
+    "nis_without_wrench_state",
+    "rollout_1s_position_rms_m",
 )
 _STATED = ("name", "coefficients", "std", "units", "evidence")  # of an effect not needed
 
@@ -72,8 +79,8 @@ def report_data(diagnosis: Diagnosis) -> Data:
     """
     error: Data = {
         "held_out_segments": [[start, end] for _, start, end in diagnosis.held_out_segments],
-        "before": _errors(diagnosis.before),
-        "after": _errors(diagnosis.after),
+        "before": dict(zip(_ERRORS, astuple(diagnosis.before), strict=True)),
+        "after": dict(zip(_ERRORS, astuple(diagnosis.after), strict=True)),
         "floor": {
             "force_rms_N": diagnosis.floor_force_rms,
             "torque_rms_Nm": diagnosis.floor_torque_rms,
@@ -112,12 +119,3 @@ def report_schema() -> Data:
     """Return the JSON Schema (draft 2020-12) of ``report.json``."""
     schema: Data = json.loads(page_file("report.schema.json"))
     return schema
-
-
-def _errors(errors: Errors) -> NamedNumbers:
-    return {
-        "force_rms_N": errors.force_rms,
-        "torque_rms_Nm": errors.torque_rms,
-        "nis_without_wrench_state": errors.nis_without_wrench_state,
-        "rollout_1s_position_rms_m": errors.rollout_1s_position_rms,
-    }

@@ -16,7 +16,7 @@ from .words import (
     disturbance_at,
     disturbances,
     energy,
-    error_sentences,
+    error_of_the_effects,
     first_doubt,
     in_unit,
     in_words,
@@ -34,7 +34,7 @@ def headline(diagnosis: Diagnosis) -> str:
     the effects by the energy that each explains, else the disturbance.
     """
     doubt = first_doubt(warnings_in(diagnosis.notes))
-    return " ".join([*doubt, _verdict(diagnosis), *error_sentences(diagnosis)][:2])
+    return " ".join([*doubt, _verdict(diagnosis), *error_of_the_effects(diagnosis)][:2])
 
 
 def _verdict(diagnosis: Diagnosis) -> str:

@@ -2,7 +2,6 @@
 
 import re
 import warnings
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -36,12 +35,13 @@ class _LogCheck:
     channels: list[Channel]
     doubts: Names  # of the reading; the gravest first
     limits: Names  # not shown by the log
+    flew: tuple[str, str]  # and the reason
     guess: Guess | None
     map_text: str  # the log's map as a YAML file; empty without one
 
     def headline(self) -> str:
         """Return the gravest doubt, and what flew how long and how far."""
-        answer, by = flew(self.log)
+        answer, by = self.flew
         what = self.log.vehicle or self.log.flown.airframe
         told = first_doubt(self.doubts)
         if answer.startswith("yes"):
@@ -52,7 +52,7 @@ class _LogCheck:
 
     def what_flew(self) -> list[Names]:
         """Return facts of the vehicle and its flight: name, value, source."""
-        return [*self.log.flown.rows(), ("flew", *flew(self.log))]
+        return [*self.log.flown.rows(), ("flew", *self.flew)]
 
     def as_dict(self) -> Data:
         """Return the check as plain values."""
@@ -68,7 +68,7 @@ class _LogCheck:
                 for c in self.channels
             },
             "vehicle": log.vehicle or None,
-            "flown": asdict(log.flown) | dict(zip(("flew", "flew_by"), flew(log), strict=True)),
+            "flown": asdict(log.flown) | dict(zip(("flew", "flew_by"), self.flew, strict=True)),
             "notes": list(log.notes),
             "doubts": [*self.doubts, *self.limits],
             "map": self.map_text or None,
@@ -119,6 +119,9 @@ def check_log(
         for r in (guess.doubts if guess else ())
     ]
     vehicle = flown_vehicle(vehicle, log.vehicle)
+    told = flew(log)
+    if told[0] in ("no", "not shown"):
+        guessed.insert(0, f"the log does not show a flight: {told[1]}")
     doubts = _doubts(log, guessed, vehicle)
     limits = [
         f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
@@ -129,7 +132,7 @@ def check_log(
     ]
     if vehicle is None:
         limits.append("no vehicle is given: the rotor speeds were not checked against its weight")
-    return _LogCheck(log, read_by, log_channels(log), doubts, tuple(limits), guess, text)
+    return _LogCheck(log, read_by, log_channels(log), doubts, tuple(limits), told, guess, text)
 
 
 def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[FlightLog, Guess]:
@@ -146,13 +149,10 @@ def _guessed(table: Table, vehicle: Vehicle | None, piece: int | None) -> tuple[
         raise UnreadLogError(str(refused), map_yaml(guess)) from refused
 
 
-def _doubts(log: FlightLog, guessed: Sequence[str], vehicle: Vehicle | None) -> Names:
-    """Return the doubts of a log's reading, the gravest first: no flight, guesses, a refusal by
-    a diagnosis, warnings.
+def _doubts(log: FlightLog, doubts: list[str], vehicle: Vehicle | None) -> Names:
+    """Return the doubts of a log's reading, the gravest first: the given ones, a refusal by a
+    diagnosis, warnings.
     """
-    answer, by = flew(log)
-    grounded = [f"the log does not show a flight: {by}"] if answer in ("no", "not shown") else []
-    doubts = [*grounded, *guessed]
     told = warnings_in(log.notes)
     if vehicle is None:
         told += filter(None, [convention_doubt(log, None)])

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...runtime.plain_values import plain
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
-from ..logs.table import Array, ArrayPair, Data, Names, Pair, Rows, finite_rows
+from ..logs.table import Array, Data, Names, Pair, Rows, finite_rows
 from ..motion.smoothing import power_spectrum, runs_of
 from .words import percent, rounded, scale_of
 
@@ -25,6 +25,7 @@ _STEPS = 32_000  # in a packed series, between zero and its largest value
 _TICK = 1e-4  # s, packed times
 _ROWS = 16  # in a table over time or frequency
 _POINTS = 360  # in a signature
+_BINS = 14  # in a signature's mean
 _SPECTRUM_SECONDS = 8.0  # segments of a spectrum
 _FREQUENCIES = 160  # in a spectrum
 _MOST_PIECES = 40  # pieces of flight with rows of their own
@@ -230,8 +231,10 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
     columns = columns[finite_rows(columns)]
     symbol = _SYMBOLS[CHANNELS.index(signature.channel)]
     factor, unit = scale_of(columns[:, 1:].ravel(), "N" if symbol.startswith("F") else "Nm")
-    x, residual, fitted = (columns * [1.0, factor, factor]).T
-    middle, mean = _binned(x, residual)
+    columns = columns * [1.0, factor, factor]
+    x, residual, fitted = columns.T
+    means = _binned(columns)
+    middle, mean, _ = means.T
     kept = np.linspace(0, len(x) - 1, min(len(x), _POINTS)).astype(int)
     kept = kept[np.argsort(x[kept], kind="stable")]
     correlation = ""
@@ -252,12 +255,9 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
         },
         _PlotTable(
             f"{signature.effect}: {symbol} ({unit}) over {signature.regressor}, means of "
-            f"{len(middle)} groups of equally many points",
+            f"{len(means)} groups of equally many points",
             (signature.regressor, "Residual without it", "Effect"),
-            [
-                (rounded(at), rounded(r, 2), rounded(f, 2))
-                for at, r, f in zip(middle, mean, _binned(x, fitted)[1], strict=True)
-            ],
+            [(rounded(at), rounded(r, 2), rounded(f, 2)) for at, r, f in means],
         ),
         f"{symbol} ({unit})",
         signature.regressor,
@@ -267,12 +267,14 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
     )
 
 
-def _binned(x: Array, y: Array, count: int = 14) -> ArrayPair:
-    """Return the mean of ``y`` over ``x`` (n,) in bins with as many points each."""
-    if len(x) < 4 * count:
-        return np.empty(0), np.empty(0)
-    parts = np.array_split(np.argsort(x, kind="stable"), count)
-    return np.array([x[p].mean() for p in parts]), np.array([y[p].mean() for p in parts])
+def _binned(columns: Array) -> Array:
+    """Return the mean rows of columns (n, k) in bins of the first column with as many points
+    each.
+    """
+    if len(columns) < 4 * _BINS:
+        return np.empty((0, columns.shape[1]))
+    parts = np.array_split(np.argsort(columns[:, 0], kind="stable"), _BINS)
+    return np.array([columns[rows].mean(axis=0) for rows in parts])
 
 
 def telling_samples(lines: Array, columns: int) -> Rows:

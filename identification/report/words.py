@@ -10,6 +10,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
 _CERTAIN = 0.001  # probability; closer to 0 or 1 no digit is meant
 _LIKELIER = 0.5  # probability of a cause outside the library, from which this comes first
+_MUCH = 0.1  # fall of an error as a share, from which the headline states it beside a larger fall
 _MILLI = 0.8  # N or Nm, below which an error is in thousandths
 _WARNING = "warning: "  # marks a note on a doubtful log
 
@@ -165,17 +166,34 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return the known errors of force and torque on held-out data, before and after, as
     sentences.
     """
+    return [f"Held-out {text}." for _, text in _errors(diagnosis)]
+
+
+def error_of_the_effects(diagnosis: Diagnosis) -> list[str]:
+    """Return the sentence on the errors lowered by the named effects, the larger fall first; the
+    error of largest fall alone where none falls much. Nothing is returned for unknown errors.
+    """
+    by_fall = sorted(_errors(diagnosis), key=lambda error: -error[0])
+    told = [text for fall, text in by_fall if fall > _MUCH] or [text for _, text in by_fall[:1]]
+    return [f"Held-out {'; '.join(told)}."] if told else []
+
+
+def _errors(diagnosis: Diagnosis) -> list[tuple[float, str]]:
+    """Return the fall of the known errors of force and torque as a share, and each in words."""
     bound = "at least " if diagnosis.floor_is_bound else ""
-    said = []
-    for row in error_table(diagnosis)[:2]:
+    told = []
+    for row, name in zip(error_table(diagnosis), ("force_rms", "torque_rms"), strict=False):
         before, after, floor = (
             f"{row[x]}\N{NO-BREAK SPACE}{row['unit']}" for x in ("before", "after", "floor")
         )
         if MISSING not in before + after:
-            change = f"{before} before, {after} after" if diagnosis.effects else after
+            change, fall = after, 0.0
+            if diagnosis.effects:
+                change = f"{before} before, {after} after"
+                fall = 1.0 - getattr(diagnosis.after, name) / getattr(diagnosis.before, name)
             kind = row["what"].partition(",")[0].lower()
-            said.append(f"Held-out {kind} error: {change} (noise floor {bound}{floor}).")
-    return said
+            told.append((fall, f"{kind} error: {change} (noise floor {bound}{floor})"))
+    return told
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:

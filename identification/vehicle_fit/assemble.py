@@ -8,29 +8,30 @@ import numpy as np
 from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, Vehicle
 from ..logs.flight_log import Logs
-from ..logs.table import median_step
+from ..logs.table import NamedNumbers, Values, median_step
 from ..motion.sensor_noise import sensor_noise
-from .effect_settings import effect_of, estimate_name
+from .effect_settings import effect_of
 from .geometry import (
     COMMAND_SPREAD,
     HOVER_SPEED,
     QUADRANT,
     ROTOR_RADIUS,
     THRUST_SPREAD,
-    Geometry,
 )
 from .model import inertia_of
 from .motors import MotorResponse
-from .parameters import FURTHER
-from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate, Estimated
+from .parameters import FURTHER, QUANTITIES
+from .result import ASSUMED, IDENTIFIED, NOTHING, Estimated
 from .solve import VehicleFit
+
+# roles of the library's effects within a fit's reach
+ROLES = dict.fromkeys(further.role for further in FURTHER.values() if further.role)
 
 
 def vehicle_of(
     name: str,
     fit: VehicleFit,
     estimates: Estimated,
-    geometry: Geometry,
     logs: Logs,
     step: float,
     motors: MotorResponse | None,
@@ -38,43 +39,48 @@ def vehicle_of(
     """Return the vehicle, ready for estimate, diagnose and the environment. Measured rotor speeds
     have the lag behind them already: then no effect of the model has one.
     """
-    arm = estimates["arm_l"].value
-    effects = _effects(estimates)
-    curve = None
-    if fit.drive.commands:
-        thrust = np.zeros(max(fit.drive.exponents) + 1)
-        for j, exponent in enumerate(fit.drive.exponents):
-            thrust[exponent] = fit.values[f"a{j}"]
+    model, geometry, arm, curve = fit.model, fit.model.geometry, estimates["arm_l"].value, None
+    # identified values with 0 outside the interval
+    shown = {
+        name: e.value
+        for name, e in estimates.items()
+        if e.status == IDENTIFIED and not e.low < 0.0 < e.high
+    }
+    if model.commands:
+        thrust = np.zeros(max(model.exponents) + 1)
+        thrust[[*model.exponents]] = [fit.values[f"a{j}"] for j in range(len(model.exponents))]
         voltage = estimates["voltage_exponent"]
-        known = voltage.value if voltage.status == IDENTIFIED else 0.0
-        curve = MotorCurve(tuple(thrust.tolist()), known)
-        k = fit.model.weight / (4.0 * HOVER_SPEED**2)
+        exponent = voltage.value if voltage.status == IDENTIFIED else 0.0
+        curve = MotorCurve(tuple(thrust.tolist()), exponent)
+        k = model.weight / (4.0 * HOVER_SPEED**2)
     else:
         k = estimates["k"].value
         if motors is not None:  # thrust against command by way of the speed
             curve = MotorCurve(tuple(k * np.polynomial.polynomial.polypow(motors.speed, 2)))
-    late, of_lag = "lag" in fit.model.free, effect_of(Role.LAG)
+    late, of_lag = "lag" in model.free, effect_of(Role.LAG)
+    coefficients = {role: _coefficients(role, shown) for role in ROLES}
+    if coefficients[Role.ROTOR_DRAG]:  # a drag at the rotors damps by itself
+        coefficients[Role.RATE_DAMPING] = {}
     if late:
-        coefficient = get(of_lag).coefficients[0].name
-        effects.append(EffectSetting(of_lag, {coefficient: estimates[of_lag].value}))
+        lag = get(of_lag).coefficients[0].name
+        coefficients[Role.LAG] = {lag: estimates[of_lag].value}
     inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
-    inertia |= {n: _shown(estimates.get(n)) for n in ("Jxy", "Jxz", "Jyz")}
     even = np.allclose(geometry.positions, geometry.arm * QUADRANT)
     vehicle = Vehicle(
         name=name,
-        mass=fit.model.mass,
-        inertia=inertia_of(inertia),
+        mass=model.mass,
+        inertia=inertia_of(shown | inertia),
         arm_l=arm,
         k=np.full(4, k),
         p=np.full(4, estimates["p/k"].value * k),
         rotor_radius=ROTOR_RADIUS * arm,
         omega_lsb=step,
         omega_source="commanded" if late else "measured",
-        voltage_ref=fit.drive.voltage_ref,
-        spin=fit.drive.spin.copy(),
+        voltage_ref=model.voltage_ref,
+        spin=model.spin.copy(),
         rotor_positions=None if even else geometry.positions,
-        com=np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"]),
-        effects=tuple(effects),
+        com=np.array([shown.get(f"com {a}", 0.0) for a in "xyz"]),
+        effects=tuple(EffectSetting(effect_of(r), c) for r, c in coefficients.items() if c),
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),
     )
@@ -84,6 +90,13 @@ def vehicle_of(
     noise, rate = sensor_noise(posed, vehicle), 1.0 / median_step(posed.t[posed.valid])
     mocap = Mocap(rate, max(noise.position, 1e-5), max(noise.attitude, 1e-4))
     return replace(vehicle, mocap=mocap)
+
+
+def _coefficients(role: str, shown: Values) -> NamedNumbers:
+    """Return the coefficients of a role's effect, without impossible signs."""
+    effect = effect_of(role)
+    values = {c: shown.get(f"{effect} {c.name}", 0.0) for c in get(effect).coefficients}
+    return {c.name: x for c, x in values.items() if x > 0.0 or (x < 0.0 and c.minimum < 0.0)}
 
 
 def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertainty:
@@ -109,60 +122,21 @@ def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertaint
     )
 
 
-def _shown(estimate: Estimate | None) -> float:
-    """Return the value of an identified quantity whose interval excludes 0; else 0."""
-    if estimate is None or estimate.status != IDENTIFIED or estimate.low < 0.0 < estimate.high:
-        return 0.0
-    return estimate.value
-
-
-def _effects(estimates: Estimated) -> list[EffectSetting]:
-    out = {}
-    for role in dict.fromkeys(further.role for further in FURTHER.values() if further.role):
-        effect = effect_of(role)
-        coefficients = {}
-        for i, c in enumerate(get(effect).coefficients):
-            known = estimates.get(estimate_name(role, i))
-            if known is not None and ((value := _shown(known)) > 0.0 or c.minimum < 0.0):
-                coefficients[c.name] = value
-        if any(coefficients.values()):
-            out[role] = EffectSetting(effect, coefficients)
-    # a drag at the rotors damps by itself
-    if Role.ROTOR_DRAG in out:
-        out.pop(Role.RATE_DAMPING, None)
-    return list(out.values())
-
-
 def advice_of(estimates: Estimated) -> list[str]:
     """Return the flights or arguments to add for quantities missing from the logs."""
     lag = effect_of(Role.LAG)
-    climb = "Climb hard and let the vehicle sink: the thrust curve is known where it flew."
-    brisk = "Climb and sink briskly: thrust that changes shows the centre of mass."
-    advice = {
-        "arm_l": "Give --geometry, the rotors' distance from the body axes: inertia follows.",
-        "Jxx": "Fly quick roll movements for 20 s: they show Jxx.",
-        "Jyy": "Fly quick pitch movements for 20 s: they show Jyy.",
-        "Jzz": "Yaw at 1 to 2 rad/s while moving to and fro in roll and pitch for 20 s: the "
-        "gyroscopic torque shows Jzz, and with it p.",
-        "(p/k)/Jzz": "Turn quickly to the left and to the right: it shows p/k over Jzz.",
-        lag: "Climb, roll and pitch in quick steps: they tell a motor's lag from a time offset.",
-        "thrust(0.75)": climb,
-        "thrust(0.25)": climb,
-        "voltage_exponent": "Log the voltage, and climb and sink with a full and with an empty "
-        "battery: it tells the voltage from the thrust curve.",
-        "com x": brisk,
-        "com y": brisk,
-        "drag": "Fly to and fro at 2 m/s and more along both body axes: it shows drag.",
+    missing = {
+        "lag" if name == lag else name: e
+        for name, e in estimates.items()
+        if e.status in (ASSUMED, NOTHING)
     }
-    unmeasured = {
-        lag: "Log the motor commands beside the rotor speeds: together they show the lag.",
-        "drag": "Log the position: drag needs a velocity.",
-    }
-    for name in unmeasured.keys() & estimates.keys():
-        if math.isnan(estimates[name].value):
-            advice[name] = unmeasured[name]
     if estimates["arm_l"].status == ASSUMED:  # and inertia with it
-        for name in ("Jxx", "Jyy", "Jzz"):
-            del advice[name]
-    open_ones = {e.name for e in estimates.values() if e.status in (ASSUMED, NOTHING)}
-    return list(dict.fromkeys(text for name, text in advice.items() if name in open_ones))
+        missing = {name: e for name, e in missing.items() if name not in ("Jxx", "Jyy", "Jzz")}
+    nowhere = {name for name, e in missing.items() if math.isnan(e.value)}
+    advice, unmeasured = QUANTITIES["advice"], QUANTITIES["unmeasured"]
+    texts = (
+        (unmeasured if name in nowhere & unmeasured.keys() else advice)[name]
+        for name in advice
+        if name in missing
+    )
+    return list(dict.fromkeys(texts))

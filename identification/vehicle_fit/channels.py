@@ -45,7 +45,7 @@ class MotionPiece(NamedTuple):
     log: int  # index of the log
     t: Array  # (n,) s
     period: float  # s
-    specific_force: Array | None  # (n, 3) m/s2
+    specific_force: Array  # (n, 3) m/s2; NaN: not known
     angular_acceleration: Array  # (n, 3) rad/s2
     angular_velocity: Array  # (n, 3) rad/s, smoothed
     velocity: Array | None = None  # (n, 3) m/s, body axes, smoothed
@@ -54,10 +54,8 @@ class MotionPiece(NamedTuple):
     voltage: Array | None = None  # (n,) V
 
     def measured(self) -> Array:
-        """Return specific force, zero where none is known, and angular acceleration (n, 6)."""
-        force = self.specific_force
-        none = np.zeros_like(self.angular_acceleration)
-        return np.column_stack([none if force is None else force, self.angular_acceleration])
+        """Return specific force and angular acceleration (n, 6)."""
+        return np.column_stack([self.specific_force, self.angular_acceleration])
 
     @property
     def rotors(self) -> Array:
@@ -93,19 +91,17 @@ def _sources_of(logs: Logs) -> Sources:
         InputError: a log has no motion, its rotors were measured too seldom, or some logs have
             rotor speeds and others commands.
     """
-    # each channel of the rotors must be quick enough to tell their torque
-    commands = [
-        log.command is not None and serves(log.rates.get("commands", np.inf), TORQUE_HZ)
-        for log in logs
+
+    def quick(log: FlightLog, channel: str) -> bool:
+        """Return whether a channel of the rotors is quick enough to tell their torque."""
+        return serves(log.rates.get(channel, np.inf), TORQUE_HZ)
+
+    unmeasured = [
+        log for log in logs if not log.has_rotor_speeds or log.commanded or not quick(log, "rotors")
     ]
-    speeds = [
-        log.has_rotor_speeds
-        and not log.commanded
-        and serves(log.rates.get("rotors", np.inf), TORQUE_HZ)
-        for log in logs
-    ]
-    if not all(speeds) and not all(commands):
-        log = logs[speeds.index(False)]
+    commands = all(log.command is not None and quick(log, "commands") for log in logs)
+    if unmeasured and not commands:
+        log = unmeasured[0]
         rates = [f"{x} {log.rates[x]:.3g} Hz" for x in ("rotors", "commands") if x in log.rates]
         raise InputError(
             f"{log.source or logs[0].name}: expected rotor speeds (omega1..omega4) in every log, "
@@ -122,7 +118,7 @@ def _sources_of(logs: Logs) -> Sources:
     return Sources(
         "accelerometer" if accelerometer else "pose" if pose else "",
         "gyro" if gyro else "pose",
-        "rotor speeds" if all(speeds) else "commands",
+        "commands" if unmeasured else "rotor speeds",
         pose,
     )
 
@@ -214,7 +210,8 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
-        force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
+        none, felt = np.full_like(rate, np.nan), log.accelerometer
+        force = none if felt is None else _sensor(log, felt, t)
         piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
         moving = []
         if sources.velocity:

@@ -27,12 +27,15 @@ UNITS = {  # in the order of the coefficients
     "never_answered": "rad/s2/(m/s)",
     "yaw_damping": "1/s",
 }
-_EITHER_SIGN = np.array([name in ("flapping", "never_answered") for name in UNITS])
+_LOWEST = np.array([-np.inf if unit.endswith("(m/s)") else 0.0 for unit in UNITS.values()])
+_DAMPING = np.array(["damping" in name for name in UNITS])
 # a loop that damps within .2 s; the unmeasured moments' start is the model's own turning
 _BEGIN = LoopReaction(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
+# the body's rate decays, whatever the rotors do
+_DAMPED = LoopReaction(0.0, 0.0, 0.0, 1e6, 4.0, 0.0, 0.0, 0.0, 4.0)
 _SIZES = np.array([0.5, 0.5, 0.5, 30.0, 10.0, 20.0, 10.0, 3.0, 5.0])  # of the coefficients
-# share of the loss: the prior's at three sizes from the start. Coefficients without excitation stay
-_PRIOR = 0.003
+# share of the loss: the prior's at a size from the start. Coefficients without excitation stay
+_PRIOR = 0.003 / 9.0
 _STARTS = 500  # predictions of a fit, spread over the flights
 _TIMES = 5  # compared in a horizon
 _ROUNDS = 15
@@ -44,27 +47,18 @@ _STEP = 1e-3  # of a coefficient's size, of finite differences
 
 class LoopFit(NamedTuple):
     """The likeliest loop, and the standard deviations (9,) of its coefficients, by the scatter of
-    groups of starts (a sandwich).
+    groups of starts (a sandwich); 0 if not fitted.
     """
 
     loop: LoopReaction
     deviations: Array
 
 
-def _moved(theta: Array, gram: Array, gradient: Array, damping: float) -> Array:
-    """Return the coefficients after a damped step, the best one with those of one sign not beyond
-    0.
-    """
-    root = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
-    aim = root.T @ theta - np.linalg.solve(root, gradient)
-    least = np.where(_EITHER_SIGN, -np.inf, 0.0)
-    return np.asarray(lsq_linear(root.T, aim, (least, np.inf)).x)
-
-
 def fit_loop(
     starts: Sequence[LoggedStarts],
     vehicle: Vehicle,
     near: LoopReaction | None = None,
+    damped: bool = False,
 ) -> LoopFit:
     """Return the loop of flights with starts, one at least.
 
@@ -72,6 +66,7 @@ def fit_loop(
         starts: of each flight; those of a segment are a group.
         vehicle: with the force, inertia and rotors that stay.
         near: the loop by more starts: two rounds from there; None: from a usual one.
+        damped: the body rate decays, and nothing else turns the body.
     """
     every = max(1, sum(len(part.rows) for part in starts) // _STARTS)
     thin = [part.those(slice(None, None, every)) for part in starts if len(part.rows)]
@@ -79,50 +74,55 @@ def fit_loop(
     # mean distances (n, 1, 4, 1) of a flight at the horizon's end if nothing changes
     far = [np.maximum(distances(part.unchanged, part.seen)[:, -1], _LEAST) for part in thin]
     sizes: Array = np.repeat(far, [len(part.rows) for part in thin], axis=0)[:, None, :, None]
-
-    def off(theta: Array) -> Array:
-        model = replace(vehicle, closed_loop=LoopReaction(*theta.tolist()))
-        return np.concatenate([_compared(part, part.flown(model)) for part in thin]) / sizes
-
     speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
     turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
-    begin = np.array(astuple(replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))))
-    theta = begin if near is None else np.array(astuple(near))
-    e, damping = off(theta), 1e-3
+    usual = replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))
+    begin = np.array(astuple(_DAMPED if damped else usual))
+    free, shares = _DAMPING | (not damped), np.arange(1, _TIMES + 1) / _TIMES
+    unit = np.diag(_SIZES)[free]  # units of the fitted numbers x (p,)
+
+    def loop(x: Array) -> LoopReaction:
+        return LoopReaction(*np.maximum(begin + x @ unit, _LOWEST).tolist())
+
+    def off(x: Array) -> Array:
+        """Return the differences (n, _TIMES, 4, 3) of predictions from the flight."""
+        model, each = replace(vehicle, closed_loop=loop(x)), []
+        for part in thin:
+            at = np.rint(shares * len(part.ahead)).astype(int) - 1
+            each.append(offsets(part.flown(model)[:, at], part.seen[:, at]))
+        return np.concatenate(each) / sizes
+
+    start = begin if near is None else np.array(astuple(near))
+    bound, x = (((at - begin) / _SIZES)[free] for at in (_LOWEST, start))
+    e, damping = off(x), 1e-3
     for _ in range(_ROUNDS if near is None else _AGAIN):
         norms = np.linalg.norm(e, axis=-1)
         least = np.maximum(0.5 * np.median(norms, axis=(0, 1)), _LEAST)
         root = 1.0 / np.sqrt(np.maximum(norms, least))[..., None]
-        moves = _STEP * _SIZES
-        changes = [(root * (off(theta + x) - e)).reshape(len(e), -1) for x in np.diag(moves)]
-        slopes = np.stack(changes, axis=1) / moves[:, None]  # (n, 9, ..)
+        moves = _STEP * np.eye(len(x))
+        changes = [(root * (off(x + move) - e)).reshape(len(e), -1) for move in moves]
+        slopes = np.stack(changes, axis=1) / _STEP  # (n, p, ..)
         residual = (root * e).reshape(len(e), -1, 1)
-        strength = _PRIOR * np.square(residual).sum() / np.square(3.0 * _SIZES)
-        grams = np.concatenate([slopes @ np.swapaxes(slopes, 1, 2), np.diag(strength)[None]])
-        gradients = np.vstack([(slopes @ residual)[..., 0], strength * (theta - begin)])
-        before = _loss(e, theta - begin)
+        strength = _PRIOR * np.square(residual).sum()
+        grams = np.vstack([slopes @ np.swapaxes(slopes, 1, 2), strength * np.eye(len(x))[None]])
+        gradients = np.vstack([(slopes @ residual)[..., 0], strength * x])
+        gram, before = grams.sum(axis=0), _loss(e, x)
         for _ in range(6):
-            tried = _moved(theta, grams.sum(axis=0), gradients.sum(axis=0), damping)
+            lower = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
+            aim = lower.T @ x - np.linalg.solve(lower, gradients.sum(axis=0))
+            tried = lsq_linear(lower.T, aim, (bound, np.inf)).x
             there = off(tried)
-            loss = _loss(there, tried - begin)
+            loss = _loss(there, tried)
             if loss < before:
-                theta, e, damping = tried, there, max(damping / 6.0, 1e-6)
+                x, e, damping = tried, there, max(damping / 6.0, 1e-6)
                 break
             damping *= 8.0
         if before - loss < _SETTLED * before:
             break
     scores = (group == np.unique(group)[:, None]) @ gradients
-    deviations = np.linalg.norm(scores @ np.linalg.inv(grams.sum(axis=0)), axis=0)
-    return LoopFit(LoopReaction(*theta.tolist()), deviations)
+    return LoopFit(loop(x), np.linalg.norm(scores @ np.linalg.inv(gram), axis=0) @ unit)
 
 
 def _loss(e: Array, away: Array) -> float:
-    """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (9,)."""
-    prior = 1.0 + _PRIOR * np.square(away / (3.0 * _SIZES)).sum()
-    return float(prior * np.linalg.norm(e, axis=-1).mean())
-
-
-def _compared(part: LoggedStarts, path: Array) -> Array:
-    """Return the differences (n, _TIMES, 4, 3) of paths (n, m, STATE) from the flight."""
-    at = np.rint(np.arange(1, _TIMES + 1) / _TIMES * path.shape[1]).astype(int) - 1
-    return offsets(path[:, at], part.seen[:, at])
+    """Return the mean norm of errors (n, _TIMES, 4, 3), and the prior's of a distance (p,)."""
+    return float((1.0 + _PRIOR * away @ away) * np.linalg.norm(e, axis=-1).mean())

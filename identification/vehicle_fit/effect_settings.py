@@ -4,12 +4,12 @@ from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
 
 
-def effect_of(role: Role) -> str:
+def effect_of(role: str) -> str:
     """Return the library's first effect of a role."""
-    return playing(role)[0]
+    return playing(Role(role))[0]
 
 
-def estimate_name(role: Role, index: int) -> str:
+def estimate_name(role: str, index: int) -> str:
     """Return the name of a role's estimate: effect and coefficient."""
     effect = effect_of(role)
     return f"{effect} {get(effect).coefficients[index].name}"

@@ -73,7 +73,7 @@ def _simulator(name: str, identified: Identified) -> str:
     lag, drag = identified.estimates[effect_of(Role.LAG)], linear_drag(v)
     x, y, _ = np.sign(v.positions[_CRAZYFLIE].T)
     notes = ""
-    if identified.fit.drive.commands:
+    if identified.fit.model.commands:
         notes = (
             "# these logs hold commands, no rotor speeds: k and p are scaled so that rotors hover "
             f"at {v.hover_rate:.0f} rad/s; thrust and torque are right, speeds are not\n"

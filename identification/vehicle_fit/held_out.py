@@ -7,8 +7,9 @@ its torque, both; and where torque is refuted, the flight loop's reaction in its
 stands if no quantity is worse than the better one of no change and of thrust and drag. The one with
 the least mean of these ratios is the vehicle.
 
-One flight tells no reaction: on a slower flight of a racer the body rate was off by 3 times the
-error of no change.
+One flight tells how the body rate decays, and nothing else of a reaction. All nine coefficients
+hold the trajectory, too: on a slower flight of a racer the body rate was off by 2.1 times the error
+of no change, and by 1.06 times with two dampings.
 """
 
 from collections.abc import Callable
@@ -99,11 +100,13 @@ def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -
         own = np.flatnonzero(number == i)
         part = logged_starts(log, vehicle, spans[own].tolist(), _HORIZON)
         starts.append(part._replace(segment=own[part.segment]))
-    refits = []
     folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
-    for where, fold in folds.items():
-        if np.ptp(fold) > 0:
-            refits += [(where, kept, part) for kept, part in refitted(fit, fold)]
+    refits = [
+        (where, *each)
+        for where, fold in folds.items()
+        if np.ptp(fold) > 0
+        for each in refitted(fit, fold)
+    ]
     return _HeldParts(starts, refits)
 
 
@@ -127,25 +130,32 @@ def held_out(
     """
     if not all(log.has_pose for log in logs):
         return _by_balance(fit)
-    parts = _held_parts(pieces, logs, fit, vehicle_of(fit, ""))
+    whole = vehicle_of(fit, "")
+    parts = _held_parts(pieces, logs, fit, whole)
     errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
-    if not errors:
-        return HeldOut({}, "")
-    stands, why = standing(errors), ""
     loop: LoopFit | None = None
+    if not errors:
+        # torques refuted on the flight of their fit were off by up to 37 times the error of no
+        # change on others (10 Crazyflie flights of 9 s)
+        if any(len(of.rows) for of in parts.starts):
+            loop = fit_loop(parts.starts, whole, damped=True)
+            damped = replace(whole, closed_loop=loop.loop)
+            near, far = (of.model[:, -1] for of in errors_at(parts.starts, [damped, whole]))
+            loop = loop if np.log(near / far).mean() < 0.0 else None
+        return HeldOut({}, "", loop)
+    stands, why = standing(errors), ""
     if stands not in ("torque", WHOLE):
-        why = _reason(errors)
-        if OTHER_FLIGHTS in errors:
-            fitted = loop = fit_loop(parts.starts, vehicle_of(fit, why))
+        why, alone = _reason(errors), OTHER_FLIGHTS not in errors
+        fitted = loop = fit_loop(parts.starts, vehicle_of(fit, why), damped=alone)
 
-            def without(part: VehicleFit, kept: Mask) -> Models:
-                vehicle = vehicle_of(part, why)
-                starts = [of.those(kept[of.segment]) for of in parts.starts]
-                return loops_of(vehicle, fit_loop(starts, vehicle, fitted.loop).loop)
+        def without(part: VehicleFit, kept: Mask) -> Models:
+            vehicle = vehicle_of(part, why)
+            starts = [of.those(kept[of.segment]) for of in parts.starts]
+            return loops_of(vehicle, fit_loop(starts, vehicle, fitted.loop, alone).loop)
 
-            further = parts.errors(without)
-            errors = {where: {**each, **further[where]} for where, each in errors.items()}
-            stands = standing(errors)
+        further = parts.errors(without)
+        errors = {where: {**each, **further[where]} for where, each in errors.items()}
+        stands = standing(errors)
     pooled = {
         where: [PredictionErrors.pooled(each[name]) for name in (stands, SIMPLEST)]
         for where, each in errors.items()
@@ -183,7 +193,7 @@ def standing(errors: Errors) -> str:
 
     Blocks count by their mean, flights by the worst of them.
     """
-    worst, means = {}, {}
+    scores = {}
     for name in next(iter(errors.values())):
         bounds, ratios = [], []
         for where, each in errors.items():
@@ -191,9 +201,8 @@ def standing(errors: Errors) -> str:
             ratio = np.array([of.model[:, -1] for of in each[name]]) / least
             bounds.append(np.max(ratio if where == OTHER_FLIGHTS else ratio.mean(axis=0)))
             ratios.append(np.log(ratio).mean())
-        worst[name], means[name] = max(bounds), np.mean(ratios)
-    fine = [name for name, bound in worst.items() if bound <= _ALIKE]
-    return min(fine, key=means.__getitem__) if fine else min(worst, key=worst.__getitem__)
+        scores[name] = max(_ALIKE, *bounds), np.mean(ratios)
+    return min(scores, key=scores.__getitem__)
 
 
 def _reason(errors: Errors) -> str:
@@ -201,14 +210,15 @@ def _reason(errors: Errors) -> str:
     said = []
     for where, each in errors.items():
         whole, simple = (PredictionErrors.pooled(each[name]) for name in (WHOLE, SIMPLEST))
-        least = np.minimum(whole.still, simple.model)
-        ends = whole.model[:, -1], least[:, -1]
-        for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True):
-            figures = (
+        ends = whole.model[:, -1], np.minimum(whole.still, simple.model)[:, -1]
+        said += [
+            (
+                end / best,
                 f"{what} of {where.replace('_', ' ')} worse than the simplest guess "
-                f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)"
+                f"({end:.2g} against {best:.2g} {unit} after {_HORIZON:g} s)",
             )
-            said.append((end / best, figures))
+            for (what, unit), end, best in zip(QUANTITIES.items(), *ends, strict=True)
+        ]
     return f"not identifiable: torques predict the {max(said, key=lambda each: each[0])[1]}"
 
 

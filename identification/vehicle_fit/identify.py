@@ -8,7 +8,7 @@ are fixed by a named assumption, or left out.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, replace
 
 import numpy as np
@@ -17,19 +17,21 @@ from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
-from ..logs.flight_log import Logs
+from ..logs.flight_log import FlightLog, Logs
 from ..logs.magnitudes import motor_doubts
+from ..logs.screening import convention_doubt
 from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
 from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .closed_loop import UNITS
-from .columns import ANSWERED_HZ, Drive, balance
+from .columns import ANSWERED_HZ, balance
 from .effect_settings import effect_of
-from .estimates import Estimates, thrust_of
-from .geometry import SPIN, Geometry, Interval
+from .estimates import estimates_of, thrust_of
+from .geometry import Geometry
 from .held_out import HeldOut, held_out, loops_of, models_of
+from .model import Model
 from .motors import motor_response
-from .parameters import BIASES, FORCE_BIAS, FURTHER, POSED_BIAS, first_model
+from .parameters import FORCE_BIAS, FURTHER, POSED_BIAS, QUANTITIES, first_model
 from .plausible import check_thrust
 from .result import ASSUMED, IDENTIFIED, NOTHING, REFUTED, Estimate, Estimated, Identified, told
 from .solve import VehicleFit, nearest_body, score_tests, solve
@@ -46,7 +48,9 @@ _APART = 3.0  # standard deviations of thrust between two bands, or of a bias' p
 _CLOSE = 0.01  # share of thrust: two bands may differ by it at any interval
 _LEAST_VOLTAGE_RANGE = 0.03  # share: no exponent is fitted to a smaller range of voltage
 _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
+_NO_OFFSET = 1e-6  # s, deviation of an absent time offset
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
+WITHOUT_FORCE = "an unchanged velocity predicts data outside the fit better than the force"
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 LOOP = "predictions of half a second from states of the flight: no part of the vehicle"
 
@@ -79,34 +83,28 @@ def identify(
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = checked_pieces(logs, windows)
-    notes = []
-    commands = sources.rotors == "commands"
-    step = 0.0 if commands else rounding_step(logs)
-    drive = Drive(
-        geometry.positions,
-        SPIN,
-        geometry.known,
-        commands,
-        voltage_ref=_voltage(pieces),
-        speed_noise=speed_noise(pieces),
+    notes = [f"warning: {log.name}: {text}" for log in logs for text in _doubts(log)]
+    basic = Model(
+        mass, geometry, sources, voltage_ref=_voltage(pieces), speed_noise=speed_noise(pieces)
     )
+    step = 0.0 if basic.commands else rounding_step(logs)
     report(0.05, "fitting forces and torques")
-    fit = _first_fit(pieces, sources, drive, mass)
+    fit = _first_fit(pieces, basic)
     report(0.4, "asking whether slow and quick motion agree")
-    fit, doubt = _agreeing(pieces, fit), ""
-    if fit.drive.band < BAND:
+    fit, doubt = _agreeing(fit), ""
+    if fit.model.band < BAND:
         doubt = "quick motion contradicts slow motion in these logs"
         notes.append(
-            f"warning: above {fit.drive.band:g} Hz these logs contradict what they say below, as "
+            f"warning: above {fit.model.band:g} Hz these logs contradict what they say below, as "
             "logs do that were smoothed before they were written, or whose rotor speeds are noisy: "
             "only what is slower was used"
         )
     if sources.force == "accelerometer" and sources.velocity:
-        model = replace(fit.model, prior={**fit.model.prior, **dict.fromkeys(BIASES, POSED_BIAS)})
-        fit = solve(pieces, fit.drive, model, fit.theta)
+        biases = dict.fromkeys(QUANTITIES["biases"], POSED_BIAS)
+        fit = fit.again(prior={**fit.model.prior, **biases})
     report(0.5, "asking what else shows")
-    fit, kept, hidden = _with_optional(pieces, fit, sources)
-    if "answered torque" in kept:
+    fit = _with_optional(fit)
+    if "answered torque" in fit.kept:
         shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
         notes.append(
             f"below {ANSWERED_HZ:g} Hz {shares} of the rotors' torque about x, y and z turn "
@@ -114,7 +112,7 @@ def identify(
             "what is quicker"
         )
     report(0.8, "asking what can be told")
-    if fit.drive.spin[0] != SPIN[0]:
+    if fit.model.opposite:
         notes.append(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
             "above): the opposite ones were taken"
@@ -124,17 +122,17 @@ def identify(
             "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
             "thrust"
         )
-    motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
+    motors = None if basic.commands or "lag" in fit.model.free else motor_response(pieces)
 
     def described(part: VehicleFit, why: str) -> tuple[Estimated, Vehicle]:
-        part, _ = nearest_body(part)
-        named = Estimates(part, sources, geometry, kept, hidden, doubt or why).say_all(pieces)
-        return named, vehicle_of(name, part, named, geometry, logs, step, motors)
+        part, _ = nearest_body(replace(part, doubt=doubt or why))
+        named = estimates_of(part)
+        return named, vehicle_of(name, part, named, logs, step, motors)
 
     report(0.9, "predicting what is held out")
     tested = held_out(pieces, logs, fit, lambda part, why: described(part, why)[1])
     named, vehicle = described(fit, tested.why)
-    if not commands:
+    if not basic.commands:
         check_thrust(named["k"].value, vehicle.rotor_radius, logs[0].name)
     _, excess = nearest_body(fit)
     if excess > _APART:
@@ -144,7 +142,7 @@ def identify(
         )
     vehicle = _with_status(vehicle, named, tested)
     if "lag" in fit.model.free:
-        named["lag without offset"] = _lag_alone(pieces, fit)
+        named["lag without offset"] = _lag_alone(fit)
     if motors is not None:
         lag = effect_of(Role.LAG)
         how = (
@@ -154,8 +152,6 @@ def identify(
     return Identified(
         vehicle,
         named,
-        sources,
-        pieces,
         fit,
         tuple(notes),
         tuple(advice_of(named)),
@@ -170,12 +166,15 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
     models = models_of(vehicle)
     if tested.loop is not None:
         models |= loops_of(vehicle, tested.loop.loop)
-        stands = IDENTIFIED if "closed loop" in tested.stands else REFUTED
+        models[""] = replace(vehicle, closed_loop=tested.loop.loop)
+        stands = REFUTED if tested.stands in models_of(vehicle) else IDENTIFIED
         for size, (c, unit), value in zip(
             tested.loop.deviations, UNITS.items(), astuple(tested.loop.loop), strict=True
         ):
             name, wide = f"closed_loop {c}", 1.96 * size
-            named[name] = Estimate(name, value, value - wide, value + wide, unit, stands, LOOP)
+            if size > 0.0:
+                shows = stands if abs(value) > wide else NOTHING
+                named[name] = Estimate(name, value, value - wide, value + wide, unit, shows, LOOP)
     if not tested.stands:
         for name, e in named.items():
             if e.status == IDENTIFIED:
@@ -185,16 +184,18 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
         for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
             if effect not in flown.effects and name in named:
                 named[name] = named[name]._replace(status=REFUTED, how=WITHOUT_EFFECTS)
+    if flown.status.force == REFUTED:
+        for name, e in named.items():
+            if e.status == IDENTIFIED and name.startswith(("k", "thrust", "hover")):
+                named[name] = e._replace(status=REFUTED, how=WITHOUT_FORCE)
     known = {e.name: e.status for e in named.values() if e.status != NOTHING}
     return replace(flown, status=replace(flown.status, coefficients=known))
 
 
-def _lag_alone(pieces: Pieces, fit: VehicleFit) -> Estimate:
+def _lag_alone(fit: VehicleFit) -> Estimate:
     """Return the lag of a model without a time offset: the offset is then part of the lag."""
-    free = fit.model.free
-    model = replace(fit.model, free=tuple(name for name in free if name != "delay"))
-    start = np.delete(fit.theta, free.index("delay"))
-    alone = solve(pieces, replace(fit.drive, delay=0.0), model, start)
+    start = np.where([name == "delay" for name in fit.model.free], 0.0, fit.theta)
+    alone = fit.again(start, prior={**fit.model.prior, "delay": _NO_OFFSET})
     known = alone.interval("lag")
     how = "of a model without a time offset: what other tools call the lag"
     return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
@@ -213,6 +214,14 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
     return pieces, sources
 
 
+def _doubts(log: FlightLog) -> Iterator[str]:
+    """Yield reasons to doubt the axes and the mass of a log."""
+    if text := convention_doubt(log, None):
+        yield text
+    if "payload_position" in log.extra:
+        yield "a load is tracked: --mass is that of the vehicle with its load"
+
+
 def _voltage(pieces: Pieces) -> float:
     voltages = [p.voltage for p in pieces if p.voltage is not None]
     if len(voltages) < len(pieces):
@@ -221,38 +230,34 @@ def _voltage(pieces: Pieces) -> float:
     return middle if high - low > _LEAST_VOLTAGE_RANGE * middle > 0.0 else 0.0
 
 
-def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> VehicleFit:
+def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
     """Return the fit of the basic model."""
-    if not drive.commands:
-        model, start, drive = first_model(pieces, sources, drive, mass, ("delay",))
-        plain = solve(pieces, drive, model, start)
+    if not basic.commands:
+        model, start = first_model(pieces, basic, "delay")
+        plain = solve(pieces, model, start)
         # do the logged speeds lead the motion as commands do?
-        late = balance(pieces, replace(plain.drive, speed_noise=0.0), ("delay", "lag"))
+        model, start = plain.model.with_more(plain.theta, "lag")
+        late = balance(pieces, replace(model, speed_noise=0.0), start)
         _, (lag,), (size,) = score_tests(plain, {"lag": ("lag",)}, late)["lag"]
         if lag < _LEAST_LAG * size:
             return plain
-        model, start = model.with_more(plain.theta, "lag")
         start[-1] = _LAGS[0]
-        other = solve(pieces, drive, model, start)
+        other = solve(pieces, model, start)
         lag, low, _ = other.interval("lag", logarithm=False)
         sure = lag > _LEAST_LAG * (lag - low) / other.width
         return other if sure and plain.loss - other.loss > _cost(plain, 1) else plain
-    nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
-    best = None
+    nonlinear = ("delay", *(("gamma",) if basic.voltage_ref > 0.0 else ()), "lag")
+    best, lags = None, [*_LAGS]
     # from the richest curve down: a poor first fit takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
-        here = replace(drive, exponents=exponents)
-        model, start, here = first_model(pieces, sources, here, mass, nonlinear)
-        fits = []
-        for lag in _LAGS if best is None else (best[1].drive.lag,):
-            start[model.free.index("lag")] = lag
-            fits.append(solve(pieces, here, model, start))
-        fit = min(fits, key=lambda f: f.loss)
+        model, start = first_model(pieces, replace(basic, exponents=exponents), *nonlinear)
+        starts = ([*start[:-1], lag] for lag in lags)
+        fit = min((solve(pieces, model, np.array(x)) for x in starts), key=lambda f: f.loss)
         cost = fit.loss + _cost(fit, len(exponents))
         thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
         if rises and (best is None or cost < best[0]):
-            best = cost, fit
+            best, lags = (cost, fit), [fit.values["lag"]]
     if best is None:
         raise InputError(
             "thrust does not grow with the motor commands; expected cmd1..cmd4, 0 to 1"
@@ -260,12 +265,12 @@ def _first_fit(pieces: Pieces, sources: Sources, drive: Drive, mass: float) -> V
     return best[1]
 
 
-def _agreeing(pieces: Pieces, fit: VehicleFit) -> VehicleFit:
+def _agreeing(fit: VehicleFit) -> VehicleFit:
     """Return the fit up to the highest frequency without a contradiction: thrust agrees with slower
     motion alone (Hausman's test), and each sensor's bias is credible.
     """
     for band in _BANDS:
-        slow = solve(pieces, replace(fit.drive, band=band), fit.model, fit.theta)
+        slow = fit.again(band=band)
         wide, narrow = _hover_thrust(fit), _hover_thrust(slow)
         apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
         credible = abs(fit.values.get("force bias z", 0.0)) < _APART * FORCE_BIAS
@@ -279,7 +284,7 @@ def _hover_thrust(fit: VehicleFit) -> Pair:
     """Return thrust as a share of the weight, at the hover speed or command of the fit's start, and
     its relative standard deviation.
     """
-    exponents, weight = fit.drive.exponents, fit.model.weight
+    exponents, weight = fit.model.exponents, fit.model.weight
     # the start's curve carries the weight here; each power carries its share
     u = (weight / (4.0 * fit.model.scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
     value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, exponents, u) / weight, False)
@@ -292,23 +297,19 @@ def _cost(fit: VehicleFit, parameters: int) -> float:
     return _PENALTY * parameters * math.log(6 * frequencies)
 
 
-def _with_optional(
-    pieces: Pieces, fit: VehicleFit, sources: Sources
-) -> tuple[VehicleFit, dict[str, str], Interval | None]:
-    """Return a fit with further effects, their names, and a moment of velocity that stays hidden.
+def _with_optional(fit: VehicleFit) -> VehicleFit:
+    """Return a fit with further effects, and a hidden moment of velocity.
 
     Effects join if the logs get much likelier, the likeliest first, lest another stands for it.
-    Each has the reason to doubt it, or an empty text. The hidden moment has its value, its standard
-    deviation and the least visible value.
     """
-    moving = "linear drag x" in fit.balance.names  # there is a velocity
+    moving, rate = fit.model.sources.velocity, fit.model.sources.rate
     offered = {
-        name: further.parameters
+        name: tuple(further.parameters)
         for name, further in FURTHER.items()
-        if (moving or further.role in (None, Role.RATE_DAMPING))
-        and not (fit.drive.commands and further.of_speeds)
+        if (moving or further.role in ("", Role.RATE_DAMPING))
+        and not (fit.model.commands and further.of_speeds)
         # the noise of a pose goes round the loop: quick torques then follow noise alone
-        and (name != "answered torque" or sources.rate == "gyro")
+        and (name != "answered torque" or rate == "gyro")
     }
     kept: dict[str, str] = {}
     hidden = None
@@ -321,7 +322,7 @@ def _with_optional(
                 _, (value,), (size,) = tests["flapping"]
                 hidden = value, size, math.sqrt(_cost(fit, 1)) * size
             break
-        richer = solve(pieces, fit.drive, *fit.model.with_more(fit.theta, *offered.pop(name)))
+        richer = solve(fit.balance.pieces, *fit.model.with_more(fit.theta, *offered.pop(name)))
         asked = [FURTHER[n] for n in (*kept, name)]
         if all(richer.values[p] > 0.0 for f in asked if f.positive for p in f.parameters):
             fit = richer
@@ -334,4 +335,4 @@ def _with_optional(
         size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
         if size < math.sqrt(_cost(fit, len(at))) + fit.width:
             kept[name] = "it shows, but by so little that what shows is too large on average"
-    return fit, kept, hidden
+    return replace(fit, kept=kept, hidden=hidden)

@@ -8,37 +8,76 @@ Parameters (``theta``) are numbers near 1 or 0; ``Model.scale`` holds the unit o
 offset and voltage exponent change the columns themselves, and stand in SI units.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
 from ...runtime.arrays import Array
-from ..logs.table import ArrayPair, NamedNumbers, Names, Values
-from .geometry import GRAVITY
+from ..logs.table import NamedArrays, NamedNumbers, Names, Values
+from .channels import Sources
+from .geometry import GRAVITY, SPIN, Geometry
+from .spectra import BAND
 
-_AXES = "xyz"
-NONLINEAR = ("lag", "delay", "gamma")  # s, s, 1
+T = TypeVar("T", float, Array)
+NONLINEAR = ("lag", "gamma", "delay")  # s, 1, s; in the order of their columns
 # inertia in logarithms: positive, and with intervals of ratios
 LOGARITHMIC = ("Jx", "Jy", "Jz")
+ROWS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")  # force, and torque about the centre of mass
+PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]  # of axes
 # e_ijk of a cross product
 _CROSS = np.zeros((3, 3, 3))
 _CROSS[[0, 1, 2], [1, 2, 0], [2, 0, 1]], _CROSS[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0, -1.0
+# symmetric matrices (6, 3, 3): each picks a pair from the products of angular velocities
+_PICK = np.zeros((6, 3, 3))
+for _at, (_i, _j) in enumerate(PAIRS):
+    _PICK[_at, _i, _j] = _PICK[_at, _j, _i] = 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Model:
-    """The fitted parameters, and their sizes."""
+    """The columns' settings, the fitted parameters, and their sizes."""
 
     mass: float  # kg
-    powers: int
-    free: Names
-    scale: Values  # one unit of a parameter in SI units; 1 where none is given
-    prior: Values  # standard deviation about 0, SI units
+    geometry: Geometry
+    sources: Sources
+    exponents: tuple[int, ...] = (2,)  # basis functions of thrust
+    voltage_ref: float = 0.0  # V; 0: voltage is not used
+    opposite: bool = False  # rotors turn against their usual senses
+    band: float = BAND  # Hz: force and turning are compared up to here
+    # rad/s, standard deviation of one measured speed; not known of speeds behind a lag
+    speed_noise: float = 0.0
+    free: Names = ()
+    # one unit of a parameter in SI units; 1 where none is given
+    scale: Values = field(default_factory=dict)
+    prior: Values = field(default_factory=dict)  # standard deviation about 0, SI units
+
+    @property
+    def commands(self) -> bool:
+        """Whether the rotors are known by their commands, not by their speeds."""
+        return self.sources.rotors == "commands"
 
     @property
     def weight(self) -> float:
         """Weight, N."""
         return self.mass * GRAVITY
+
+    @property
+    def spin(self) -> Array:
+        """Turning senses (4,)."""
+        return -SPIN if self.opposite else SPIN
+
+    @property
+    def shares(self) -> NamedArrays:
+        """Each rotor's share (4,) in thrust T and in the torques X, Y and Z, m."""
+        x, y = self.geometry.positions[:, :2].T
+        return {"T": np.ones(4), "X": y, "Y": -x, "Z": -self.spin}
+
+    @property
+    def nonlinear(self) -> Names:
+        """Names of the parameters inside the columns themselves."""
+        return tuple(name for name in NONLINEAR if name in self.free)
 
     def values(self, theta: Array) -> NamedNumbers:
         """Return the free parameters in SI units."""
@@ -46,11 +85,6 @@ class Model:
             name: float(self.scale.get(name, 1.0) * (np.exp(x) if name in LOGARITHMIC else x))
             for name, x in zip(self.free, theta, strict=True)
         }
-
-    @property
-    def nonlinear(self) -> Names:
-        """Names of the parameters inside the columns themselves."""
-        return tuple(name for name in self.free if name in NONLINEAR)
 
     def with_more(self, theta: Array, *names: str) -> tuple["Model", Array]:
         """Return the model with further parameters, and the start: 0 for each of them."""
@@ -65,57 +99,33 @@ def inertia_of(p: Values) -> Array:
 
 def coefficients(model: Model, p: Values, names: Names) -> Array:
     """Return the coefficients (6, c) of the columns for parameters in SI units."""
-    mass = model.mass
-    place = {name: i for i, name in enumerate(names)}
     inertia, lever = inertia_of(p), np.array([p["rx"], p["ry"], p["rz"]])
     out = np.zeros((6, len(names)))
-    moment = out[3:]  # about the centre of mass
-
-    def add(rows: Array, i: int, column: str, parameter: str, size: float = 1.0) -> None:
-        if parameter in p:
-            rows[i, place[column]] += size * p[parameter]
-
-    for j in range(model.powers):
-        a, thrust = p[f"a{j}"], place[f"T{j}"]
-        out[:3, thrust] += np.array([p["tilt x"], p["tilt y"], 1.0]) * a / mass
-        moment[:2, thrust] += a * np.array([-p["cy"], p["cx"]])
-        for i, letter in enumerate("XYZ"):
-            moment[i, place[f"{letter}{j}"]] += a * (p["reach"] if letter == "Z" else 1.0)
-    for i, axis in enumerate(_AXES):
-        out[:3, place[f"dw{axis}"]] = _CROSS[:, i] @ lever
-        for j, other in enumerate(_AXES[i:], i):
-            products = np.zeros((3, 3))  # angular velocities' products in this column
-            products[i, j] = products[j, i] = 1.0
-            column = place[f"w{axis}w{other}"]
-            out[:3, column] = products @ lever - np.trace(products) * lever
-            moment[:, column] = -np.einsum("ijk,kj", _CROSS, inertia @ products)
-        add(out, i, "1", f"force bias {axis}")
-        add(moment, i, f"w{axis}", f"damping {axis}", -1.0)
-        add(moment, i, f"spin {axis}", "Jr")
-        for kind in ("rotor drag", "linear drag", "quadratic drag"):
-            add(out, i, f"{kind} {axis}", f"{kind} {axis}", 1.0 / mass)
-    for i, axis in enumerate("xy"):
-        add(moment, 2, f"moment of rotor drag {axis}", f"rotor drag {axis}")
-        for kind in ("rotor drag z", "lift"):
-            add(moment, i, f"moment {axis} of {kind}", kind)
-    add(out, 2, "lift", "lift", 1.0 / mass)
-    # the columns of rotor drag are minus the sum of speeds times velocity
-    add(moment, 0, "rotor drag y", "flapping")
-    add(moment, 1, "rotor drag x", "flapping", -1.0)
-    for name in names:
-        if name.startswith("slow "):
-            i, answering = "XYZ".index(name[5]), place[name.removeprefix("slow ")]
-            add(moment, i, name, f"answered {_AXES[i]}", -moment[i, answering])
-    moment[:] = np.linalg.solve(inertia, moment)
-    moment[:, place["1"]] += [p[f"turn bias {axis}"] for axis in _AXES]
+    for column, name in enumerate(names):
+        place, _, parameter = name.partition(" ")
+        if place in ROWS:
+            out[ROWS.index(place), column] = p.get(parameter, 0.0)
+    for j in range(len(model.exponents)):
+        thrust = np.array([p["tilt x"], p["tilt y"], 1.0, -p["cy"], p["cx"], 0.0])
+        out[:, names.index(f"T{j}")] = p[f"a{j}"] * thrust
+        for row, (axis, reach) in enumerate(zip("xyz", (1.0, 1.0, p["reach"]), strict=True), 3):
+            column = names.index(f"{axis.upper()}{j}")
+            out[row, column] = p[f"a{j}"] * reach
+            # the slow part stands behind
+            out[row, column + 1] = -p.get(f"answered {axis}", 0.0) * out[row, column]
+    out[:3] /= model.mass
+    # behind the constant: angular acceleration, and the products of angular velocities
+    one = names.index("1")
+    turning, products = slice(one + 1, one + 4), slice(one + 4, one + 10)
+    out[:3, turning] = _CROSS @ lever
+    out[:3, products] = (_PICK @ lever).T - np.outer(lever, _PICK.trace(axis1=1, axis2=2))
+    out[3:, products] = -np.einsum("ijk,pkj->ip", _CROSS, inertia @ _PICK)
+    out[3:] = np.linalg.solve(inertia, out[3:])
+    out[:, one] = [p.get(f"{kind} bias {a}", 0.0) for kind in ("force", "turn") for a in "xyz"]
     return out
 
 
-def jacobian(model: Model, theta: Array, names: Names) -> ArrayPair:
-    """Return the coefficients (6, c) and their derivatives (p, 6, c) by the free parameters."""
-
-    def at(x: Array) -> Array:
-        return coefficients(model, model.values(x), names)
-
-    here = at(theta)
-    return here, np.array([(at(theta + e) - here) / 1e-6 for e in 1e-6 * np.eye(len(theta))])
+def slopes(of: Callable[[Array], T], theta: Array) -> tuple[T, Array]:
+    """Return a function's value (...) and derivatives (p, ...) by the free parameters (p,)."""
+    here = of(theta)
+    return here, np.array([(of(theta + e) - here) / 1e-6 for e in 1e-6 * np.eye(len(theta))])

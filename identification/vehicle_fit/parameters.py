@@ -2,19 +2,22 @@
 by axis, with every coefficient linear.
 """
 
+import math
+from collections import ChainMap
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from ...dynamics.effects import Role
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-from ..logs.table import ArrayPair, NamedArrays, Names, Pair
-from .channels import Pieces, Sources
-from .columns import ANSWERED_HZ, Drive, rotor_columns
-from .geometry import FLAT, GRAVITY, GYRATION, Geometry
+from ...runtime.yaml_file import read_yaml
+from ..logs.table import ArrayPair, Data, NamedArrays, Pair
+from .channels import Pieces
+from .columns import ANSWERED_HZ, rotor_columns
+from .geometry import FLAT, GRAVITY, GYRATION
 from .model import Model
 from .spectra import BAND
 
@@ -34,76 +37,37 @@ _FIRST_DELAYS = np.linspace(0.0, 0.08, 9)
 _OPPOSED = 0.15
 _SWING_HZ = (0.5, 8.0)
 
-BASE = (
-    "Jx",
-    "Jy",
-    "Jz",
-    "reach",
-    "cx",
-    "cy",
-    "Jr",
-    "tilt x",
-    "tilt y",
-    "rx",
-    "ry",
-    "rz",
-    "turn bias x",
-    "turn bias y",
-    "turn bias z",
-)
-BIASES = ("force bias x", "force bias y", "force bias z")
+QUANTITIES: Data = read_yaml(Path(__file__).with_name("quantities.yaml"), "quantities")
 
 
 class Further(NamedTuple):
-    """An effect for logs that get much likelier by it."""
+    """An effect, kept if the logs get much likelier; ``quantities.yaml`` explains each field."""
 
-    parameters: Names
-    role: Role | None = None  # the library effect's role; None: not in the library
-    first: int = 0  # index of the effect's first coefficient here
-    shows: str = ""  # in force along body x and y; or along "z", or in "turning"
-    of_speeds: bool = False  # takes measured rotor speeds
-    positive: bool = True  # a negative value is no physics, but another fault of the model
-
-
-FURTHER: dict[str, Further] = {
-    "rotor drag": Further(("rotor drag x", "rotor drag y"), Role.ROTOR_DRAG, of_speeds=True),
-    "linear drag": Further(("linear drag x", "linear drag y"), Role.BODY_DRAG),
-    "quadratic drag": Further(
-        ("quadratic drag x", "quadratic drag y"), Role.BODY_DRAG, 3, positive=False
-    ),
-    "vertical drag": Further(("linear drag z",), Role.BODY_DRAG, 2),
-    "inflow": Further(("rotor drag z",), Role.INFLOW_THRUST, 0, "z", of_speeds=True),
-    "lift": Further(("lift",), Role.TRANSLATIONAL_LIFT, 0, "z", positive=False),
-    # shares of slow torques without a turn: the flight loop's answers
-    "answered torque": Further(("answered x", "answered y", "answered z")),
-    **{
-        f"damping {a}": Further((f"damping {a}",), Role.RATE_DAMPING, i, "turning")
-        for i, a in enumerate("xyz")
-    },
-    "flapping": Further(("flapping",), Role.FLAPPING_MOMENT, 0, "turning", of_speeds=True),
-    "products of inertia": Further(("Jxy", "Jxz", "Jyz"), positive=False),
-}
+    parameters: Data
+    role: str = ""
+    first: int = 0
+    factor: float = 1.0
+    shows: str = ""
+    of_speeds: bool = False
+    positive: bool = True
 
 
-def first_model(
-    pieces: Pieces,
-    sources: Sources,
-    drive: Drive,
-    mass: float,
-    nonlinear: Names,
-) -> tuple[Model, Array, Drive]:
-    """Return the model, its start, and the drive with the turning senses that yaw shows;
-    ``nonlinear`` parameters start at the drive's values.
+FURTHER: dict[str, Further] = {n: Further(**row) for n, row in QUANTITIES["effects"].items()}
+
+
+def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, Array]:
+    """Return a model with its parameters, the turning senses shown by yaw, and the start;
+    ``nonlinear`` parameters start at 0.
 
     Raises:
         InputError: roll or pitch turn against their rotors.
     """
-    columns = [rotor_columns(piece, drive) for piece in pieces]
+    columns = [rotor_columns(piece, model, {}) for piece in pieces]
+    count, mass, arm = len(model.exponents), model.mass, model.geometry.arm
     # each basis function's coefficient if it alone carried the weight
-    totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(len(drive.exponents))]
-    each = [mass * GRAVITY / max(total.mean(), 1e-12) for total in totals]
-    share, thrust = 1.0 / len(each), [f"a{j}" for j in range(len(each))]
-    shares = [share * a for a in each]
+    totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(count)]
+    each = {f"a{j}": model.weight / max(x.mean(), 1e-12) for j, x in enumerate(totals)}
+    shares = [a / count for a in each.values()]
     gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
     # a loop that answers a swinging load opposes its own slow torque, and no quick one
     _, quick = _first_gains(pieces, columns, shares, (ANSWERED_HZ, BAND))
@@ -113,80 +77,59 @@ def first_model(
                 f"{axis} turns against the torque of its rotors; expected rotors in the order "
                 "front-left, rear-left, rear-right, front-right, and body axes forward, left, up"
             )
-    arm = Geometry(drive.positions).arm
     # an axis without a turn starts at the usual inertia of such a vehicle
     usual = GYRATION[0] * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
     flat = FLAT[0] * inertia.sum()
-    speed = max(np.concatenate([p.rotors for p in pieces]).mean(), 1e-6)
-    along = {
-        "tilt": 0.01,
-        "turn bias": 0.1,
-        "force bias": 0.1,
-        "rotor drag": 0.05 * mass / speed,
-        "linear drag": 0.1 * mass,
-        "quadratic drag": 0.03 * mass,
-        "damping": inertia[0],
-        "answered": 0.3,
-    }
-    size = {
-        **dict(zip(thrust, each, strict=True)),
+    known = {
+        "mass": mass,
+        "arm": arm,
         "Jx": inertia[0],
         "Jy": inertia[1],
         "Jz": flat,
-        **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 0.1 * inertia[0]),
         "reach": np.clip(abs(gains[2]) * flat, 1e-3 * arm, 10.0 * arm),
-        **dict.fromkeys(("cx", "cy"), 0.01 * arm),
-        "Jr": 0.01 * inertia[0] / speed * np.sqrt(GRAVITY / arm),
-        **dict.fromkeys(("rx", "ry", "rz"), 0.01),
-        "lift": 0.03 * mass,
-        "flapping": 0.05 * mass / speed * 0.03 * arm,
-        **{f"{name} {a}": x for name, x in along.items() for a in "xyz"},
+        "per_speed": 1.0 / max(np.concatenate([p.rotors for p in pieces]).mean(), 1e-6),
+        "turn": np.sqrt(GRAVITY / arm),
     }
-    free = (*thrust, *BASE)
-    prior = {"delay": DELAY}
-    if sources.force == "accelerometer":
-        free = (*free, *BIASES)
-        prior |= {**dict.fromkeys(BIASES, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
-    known = dict.fromkeys(thrust, share) | {"reach": 1.0}
-    known |= {name: getattr(drive, name) for name in nonlinear}
-    model = Model(mass, len(each), (*free, *nonlinear), size, prior)
-    if gains[2] < 0.0:
-        drive = replace(drive, spin=-drive.spin)
-    return model, np.array([known.get(name, 0.0) for name in model.free]), drive
+    basic, biases = QUANTITIES["basic"], QUANTITIES["biases"]
+    units = ChainMap(basic, biases, *(further.parameters for further in FURTHER.values()))
+    scale = each | {p: math.prod(known.get(x, x) for x in unit) for p, unit in units.items()}
+    free, prior = (*each, *basic), {"delay": DELAY}
+    if model.sources.force == "accelerometer":
+        free = (*free, *biases)
+        prior |= {**dict.fromkeys(biases, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
+    model = replace(model, opposite=gains[2] < 0.0, free=free, scale=scale, prior=prior)
+    start = {**dict.fromkeys(each, 1.0 / count), "reach": 1.0}
+    theta = np.array([start.get(name, 0.0) for name in free])
+    return model.with_more(theta, *nonlinear)
 
 
 def _first_gains(
-    pieces: Pieces,
-    columns: list[NamedArrays],
-    thrust: list[float],
-    band: Pair,
+    pieces: Pieces, columns: list[NamedArrays], thrust: list[float], band: Pair
 ) -> ArrayPair:
     """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly, and their correlation
     (3,) in a ``band`` in Hz. About x and y the first is the inertia's inverse, about z the inverse
     times torque over thrust (m). Each is taken at the delay, up to 80 ms, of the largest
     correlation of either sign.
     """
-    gains, alike = np.zeros(3), np.zeros(3)
-    for i, letter in enumerate("XYZ"):
-        cross, power, turned = np.zeros(len(_FIRST_DELAYS)), 0.0, 0.0
-        for piece, column in zip(pieces, columns, strict=True):
-            torque = np.sum([a * column[f"{letter}{j}"] for j, a in enumerate(thrust)], axis=0)
-            # turning is the integral of torque: compared where neither is differentiated
-            spin = _passed(np.cumsum(torque - torque.mean()) * piece.period, piece.period, band)
-            rate = _passed(piece.angular_velocity[:, i], piece.period, band)
-            late = np.rint(_FIRST_DELAYS / piece.period).astype(int)
-            cross += [spin[: len(spin) - n] @ rate[n:] for n in late]
-            power += float(spin @ spin)
-            turned += float(rate @ rate)
-        most = cross[np.argmax(np.abs(cross))]
-        if power > 0.0 and turned > 0.0:
-            gains[i], alike[i] = most / power, most / np.sqrt(power * turned)
-    return gains, alike
-
-
-def _passed(x: Array, period: float, band: Pair) -> Array:
-    """Return the part of ``x`` (n,) in a ``band`` in Hz."""
-    low, high = (2.0 * f * period for f in band)
-    sections = butter(2, [min(low, 0.8), min(0.9, high)], btype="bandpass", output="sos")
-    return np.asarray(sosfiltfilt(sections, x))
+    cross, power, turned = np.zeros((len(_FIRST_DELAYS), 3)), np.zeros(3), np.zeros(3)
+    for piece, column in zip(pieces, columns, strict=True):
+        torque = np.sum(
+            [[a * column[f"{axis}{j}"] for axis in "XYZ"] for j, a in enumerate(thrust)], axis=0
+        )
+        # turning is the integral of torque: compared where neither is differentiated
+        spin = np.cumsum(torque.T - torque.mean(axis=1), axis=0) * piece.period
+        sections = butter(
+            2,
+            [min(2.0 * band[0] * piece.period, 0.8), min(0.9, 2.0 * band[1] * piece.period)],
+            btype="bandpass",
+            output="sos",
+        )
+        spin, rate = (sosfiltfilt(sections, x, axis=0) for x in (spin, piece.angular_velocity))
+        late = np.rint(_FIRST_DELAYS / piece.period).astype(int)
+        cross += [(spin[: len(spin) - n] * rate[n:]).sum(axis=0) for n in late]
+        power += np.square(spin).sum(axis=0)
+        turned += np.square(rate).sum(axis=0)
+    most = cross[np.abs(cross).argmax(axis=0), range(3)]
+    least = np.finfo(float).tiny
+    return most / np.maximum(power, least), most / np.maximum(np.sqrt(power * turned), least)

@@ -37,7 +37,7 @@ def identified_data(identified: Identified) -> Data:
         "mass_kg": identified.vehicle.mass,
         "flight_s": identified.fit.balance.seconds,
         "segments": len(identified.fit.balance.segments),
-        "channels": identified.sources,
+        "channels": identified.fit.model.sources,
         "estimates": [
             {
                 "name": e.name,
@@ -70,7 +70,7 @@ def headline(identified: Identified) -> str:
     """
     parts = " and the ".join(refuted(identified.vehicle))
     begin = f"held-out flight refutes the {parts}; " if parts else ""
-    thrust = "thrust(0.5)" if identified.fit.drive.commands else "k"
+    thrust = "thrust(0.5)" if identified.fit.model.commands else "k"
     shown = [identified.estimates[name] for name in (thrust, "Jxx", "Jyy", "Jzz", "p/k")]
     assumed = ", ".join(e.name for e in shown if e.status in (ASSUMED, NOTHING))
     told = ", ".join(
@@ -101,6 +101,15 @@ def use_of(identified: Identified) -> str:
         "force torque": "Use: assume an unchanged velocity and body rate; the vehicle predicts no "
         "better. Fly as advised and identify again.",
     }[" ".join(parts)]
+
+
+def reasons_of(found: Identified) -> list[str]:
+    """Return why quantities are assumed or not identifiable, a line for each reason."""
+    names: dict[str, list[str]] = {}
+    for e in found.estimates.values():
+        if e.status in (ASSUMED, NOTHING):
+            names.setdefault(e.how.removeprefix(f"{NOTHING}: "), []).append(e.name)
+    return [f"{', '.join(of)}: {why}" for why, of in names.items()]
 
 
 def table_of(errors: PredictionErrors, simplest: PredictionErrors) -> list[Names]:
@@ -146,15 +155,16 @@ def _fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     Both are (n, 6), behind the picture's low-pass and within the band of the fit.
     """
     fit = identified.fit
-    then = piece.t - fit.drive.delay
-    columns = {n: np.interp(then, piece.t, x) for n, x in rotor_columns(piece, fit.drive).items()}
-    columns |= air_columns(piece, fit.drive)
+    then = piece.t - fit.values["delay"]
+    columns = {
+        n: np.interp(then, piece.t, x)
+        for n, x in rotor_columns(piece, fit.model, fit.values).items()
+    }
+    columns |= air_columns(piece, fit.model)
     gains = coefficients(fit.model, fit.values, tuple(columns))
     model = np.column_stack(list(columns.values())) @ gains.T
+    shown_hz = min(_SHOWN_HZ, fit.model.band)
     measured = piece.measured()
-    if piece.specific_force is None:
-        measured[:, :3] = np.nan
-    shown_hz = min(_SHOWN_HZ, fit.drive.band)
     return low_pass(measured, shown_hz, piece.period), low_pass(model, shown_hz, piece.period)
 
 
@@ -169,9 +179,9 @@ def explained(identified: Identified) -> Array:
 
 @styled()
 def _picture(identified: Identified) -> "Figure":
-    vehicle, band = identified.vehicle, identified.fit.drive.band
+    vehicle, band = identified.vehicle, identified.fit.model.band
     scale = [*3 * [vehicle.mass], *np.diag(vehicle.inertia)]
-    longest = max(identified.pieces, key=lambda p: len(p.t))
+    longest = max(identified.fit.balance.pieces, key=lambda p: len(p.t))
     t = longest.t
     shown = np.abs(t - t[len(t) // 2]) <= 0.5 * _SHOWN_SECONDS
     curves = ((x[shown] * scale).T for x in _fitted(identified, longest))

@@ -6,7 +6,6 @@ from typing import NamedTuple
 from ...dynamics.vehicle import Vehicle
 from ..logs.table import Names
 from ..prediction import ErrorsByPart
-from .channels import Pieces, Sources
 from .geometry import Interval
 from .solve import VehicleFit
 
@@ -45,8 +44,6 @@ class Identified(NamedTuple):
 
     vehicle: Vehicle
     estimates: Estimated  # keys: names
-    sources: Sources
-    pieces: Pieces
     fit: VehicleFit
     notes: Names
     advice: Names

@@ -7,19 +7,20 @@ shrink the coefficients, so the addition is taken off before the normal equation
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
 
 from ...runtime.arrays import Array, Index, Mask
 from ...runtime.errors import InputError
-from ..logs.table import Data, NamedNumbers, Values
+from ..logs.table import NamedNumbers, Values
 from .channels import Pieces
-from .columns import BalanceSpectra, Drive, balance
+from .columns import BalanceSpectra, balance
 from .geometry import Interval
-from .model import Model, jacobian
+from .model import Model, slopes
 from .spectra import LOSS, TAPERS, Spectra, residual_spectra
 
 Function = Callable[[Values], float]
@@ -46,11 +47,11 @@ class VehicleFit:
     loss: float  # twice the negative log-likelihood, up to a constant
     balance: BalanceSpectra
     spectra: Spectra  # (m, 6) a segment
-
-    @property
-    def drive(self) -> Drive:
-        """The rotors' columns with the fitted lag, time offset and exponent."""
-        return self.balance.drive
+    # visible further effects, each with the reason to doubt it, or empty
+    kept: Mapping[str, str] = field(default_factory=dict)
+    # an invisible moment of velocity: value, deviation, least visible value
+    hidden: Interval | None = None
+    doubt: str = ""  # reason to believe no estimate of torque
 
     @cached_property
     def covariance(self) -> Array:
@@ -79,15 +80,21 @@ class VehicleFit:
         """Standard deviations to either end of a 95 % interval: Student's, for the segments."""
         return float(student.ppf(0.975, max(len(self.balance.segments) - 1, 3)))
 
+    def again(self, theta: Array | None = None, **changes: Any) -> "VehicleFit":
+        """Return the fit of a changed model, from these parameters or others."""
+        theta = self.theta if theta is None else theta
+        return solve(self.balance.pieces, replace(self.model, **changes), theta)
+
     def interval(self, what: str | Function, logarithm: bool = True) -> Interval:
         """Return value, low and high of a parameter, or of a function of the parameters, in SI
         units; of a positive quantity as a ratio.
         """
-        of = (lambda v: v[what]) if isinstance(what, str) else what
-        theta, values = self.theta, self.model.values
-        here = of(values(theta))
-        steps = 1e-5 * np.eye(len(theta))
-        slope = np.array([of(values(theta + e)) - of(values(theta - e)) for e in steps]) / 2e-5
+
+        def at(theta: Array) -> float:
+            values = self.model.values(theta)
+            return values[what] if isinstance(what, str) else what(values)
+
+        here, slope = slopes(at, self.theta)
         size = self.width * math.sqrt(max(float(slope @ self.covariance @ slope), 0.0))
         if logarithm and here > 0.0:
             factor = math.exp(min(size / here, 50.0))
@@ -95,35 +102,28 @@ class VehicleFit:
         return here, here - size, here + size
 
 
-def solve(pieces: Pieces, drive: Drive, model: Model, start: Array) -> VehicleFit:
-    """Return the fit of Gauss-Newton from ``start`` (p,)."""
-    theta = start.copy()
-
-    def linear() -> BalanceSpectra:
-        here: Data = {name: model.values(theta)[name] for name in model.nonlinear}
-        return balance(pieces, replace(drive, **here), model.nonlinear)
-
-    made = linear()
+def solve(pieces: Pieces, model: Model, theta: Array) -> VehicleFit:
+    """Return the fit of Gauss-Newton from ``theta`` (p,)."""
+    made = balance(pieces, model, theta)
     powers = [(np.abs(s.columns[:, :, :6]) ** 2).mean(axis=0) for s in made.segments]
     spectra = residual_spectra(made.segments, powers)
     for number in range(_ROUNDS):
-        grams = np.sum(_grams(made, spectra), axis=0)
+        grams = np.sum(_grams(made, spectra, model.band), axis=0)
         theta, information, moved = _moved(made, grams, model, theta, _STEPS)
-        made = linear()
+        made = balance(pieces, model, theta)
         if number >= 2 and moved < _CLOSE:
             break
         powers = _powers(made, spectra, model, theta, information)
         spectra = residual_spectra(made.segments, powers)
-    grams = _grams(made, spectra)
-    _, information, slopes, v = _newton(made, np.sum(grams, axis=0), model, theta)
-    scores = np.array([np.einsum("iac,acd,ad->i", slopes, g, v, optimize=True) for g in grams])
+    grams = _grams(made, spectra, model.band)
+    _, information, rows, left = _newton(made, np.sum(grams, axis=0), model, theta)
+    scores = np.array([np.einsum("iac,acd,ad->i", rows, g, left, optimize=True) for g in grams])
     # twice the negative log-likelihood of noise with the residual's spectrum
     logs = (
         (s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p))).sum()
         for s, p in zip(made.segments, spectra, strict=True)
     )
-    loss = TAPERS * sum(logs)
-    return VehicleFit(model, theta, information, scores, loss, made, spectra)
+    return VehicleFit(model, theta, information, scores, TAPERS * sum(logs), made, spectra)
 
 
 def refitted(fit: VehicleFit, fold: Index) -> list[tuple[Mask, VehicleFit]]:
@@ -133,7 +133,7 @@ def refitted(fit: VehicleFit, fold: Index) -> list[tuple[Mask, VehicleFit]]:
     Raises:
         InputError: no segment is kept.
     """
-    grams, out = np.array(_grams(fit.balance, fit.spectra)), []
+    grams, out = np.array(_grams(fit.balance, fit.spectra, fit.model.band)), []
     for held in np.unique(fold):
         keep = fold != held
         if not keep.any():
@@ -179,61 +179,55 @@ def score_tests(
     """
     model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
     made = made or fit.balance
-    grams = np.sum(_grams(made, fit.spectra), axis=0)
+    grams = np.sum(_grams(made, fit.spectra, model.band), axis=0)
     step, information, *_ = _newton(made, grams, model, start)
-    gradient, without, tests = information @ step, list(range(len(fit.theta))), {}
-
-    def reached(rows: list[int]) -> tuple[float, Array, Array]:
-        inverse = np.linalg.inv(information[np.ix_(rows, rows)])
-        moved = inverse @ gradient[rows]
-        return float(gradient[rows] @ moved), moved, np.sqrt(LOSS * np.diag(inverse))
-
+    # information of the further parameters while the fit's own follow, and behind it the slope
+    both, n, tests = np.column_stack([information, information @ step]), len(fit.theta), {}
+    both = both[n:, n:] - information[n:, :n] @ np.linalg.solve(information[:n, :n], both[:n, n:])
     for name, group in groups.items():
-        further = [model.free.index(p) for p in group]
+        at = [model.free.index(p) - n for p in group]
         units = np.array([model.scale.get(p, 1.0) for p in group])
-        fall, moved, size = reached(without + further)
-        own = slice(len(without), None)
-        tests[name] = fall - reached(without)[0], units * moved[own], units * size[own]
+        inverse, slope = np.linalg.inv(both[np.ix_(at, at)]), both[at, -1]
+        moved = inverse @ slope
+        tests[name] = slope @ moved, units * moved, units * np.sqrt(LOSS * np.diag(inverse))
     return tests
 
 
 def _moved(
-    made: BalanceSpectra, total: Array, model: Model, theta: Array, steps: int
+    made: BalanceSpectra, grams: Array, model: Model, theta: Array, steps: int
 ) -> tuple[Array, Array, float]:
     """Return the parameters (p,) after some steps, the information (p, p) before the last, and the
     longest step in standard deviations. Nonlinear parameters stay in their range and near the
-    drive's.
+    centre.
     """
     moved = 0.0
     for _ in range(steps):
-        step, information, *_ = _newton(made, total, model, theta)
+        step, information, *_ = _newton(made, grams, model, theta)
         theta = theta + np.clip(step, -1.0, 1.0)
-        for name in model.nonlinear:
-            i, here, (low, high) = model.free.index(name), getattr(made.drive, name), _RANGES[name]
-            low, high = max(low, here - _MOST_CHANGE), min(high, here + _MOST_CHANGE)
-            theta[i] = np.clip(theta[i], low, high)
+        for name, x in made.centre.items():
+            i = model.free.index(name)
+            near = np.clip(theta[i], x - _MOST_CHANGE, x + _MOST_CHANGE)
+            theta[i] = np.clip(near, *_RANGES[name])
         size = np.abs(step) * np.sqrt(np.maximum(np.diag(information), 0.0))
         moved = max(moved, size.max())
     return theta, information, moved
 
 
-def _grams(made: BalanceSpectra, spectra: Spectra) -> Spectra:
-    """Return each segment's weighted Gram matrices (6, 1 + c + nc, ...), axis by axis: the axis'
+def _grams(made: BalanceSpectra, spectra: Spectra, band: float) -> Spectra:
+    """Return each segment's weighted Gram matrices (6, 1 + ..., ...), axis by axis: the axis'
     measurement with all columns, less the rotors' noise.
     """
-    noise, c = made.noise.T @ made.noise, len(made.names)
+    noise, own = made.noise.T @ made.noise, slice(1, 1 + len(made.names))
     grams = []
     for s, spectrum in zip(made.segments, spectra, strict=True):
-        columns, gram = s.columns[:, :, 6:], []
-        gain = 1.0 / (1.0 + (s.frequency / made.drive.band) ** 4) ** 2
-        for axis in range(6):
-            weight = s.weight / spectrum[:, axis]
-            both = np.concatenate([s.columns[:, :, axis : axis + 1], columns], axis=2)
+        gain = 1.0 / (1.0 + (s.frequency / band) ** 4) ** 2
+        gram = []
+        for axis, weight in enumerate(s.weight / spectrum.T):
+            both = s.columns[:, :, [axis, *range(6, s.columns.shape[2])]]
             scaled = (both * np.sqrt(weight)[:, None]).reshape(-1, both.shape[2])
             parts = np.concatenate([scaled.real, scaled.imag])
-            products = parts.T @ parts
-            products[1 : 1 + c, 1 : 1 + c] -= noise * (weight * gain).sum() * TAPERS
-            gram.append(products)
+            gram.append(parts.T @ parts)
+            gram[axis][own, own] -= noise * (weight @ gain * TAPERS)
         grams.append(np.array(gram))
     return grams
 
@@ -241,30 +235,19 @@ def _grams(made: BalanceSpectra, spectra: Spectra) -> Spectra:
 def _newton(
     made: BalanceSpectra, grams: Array, model: Model, theta: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Return a Gauss-Newton step (p,), the information (p, p), the residual's slopes and the
-    residual.
-
-    Slopes (p, 6, 1 + c + nc) and residual (6, 1 + c + nc) combine measurement and columns.
+    """Return a Gauss-Newton step (p,), the information (p, p), and slopes (p, 6, 1 + ...) of the
+    residual's combination of measurement and columns, and the combination (6, 1 + ...).
     """
-    here, slopes = jacobian(model, theta, made.names)
-    # columns, and their derivatives times the distance from where they are linear
-    far = [theta[model.free.index(n)] - getattr(made.drive, n) for n in made.nonlinear]
-    factors = np.array([1.0, *far])
-    v = np.column_stack([np.ones(6), -np.kron(factors, here)])
-    rows = np.zeros((len(theta), *v.shape))
-    rows[:, :, 1:] = -np.kron(factors, slopes)
-    for n, name in enumerate(made.nonlinear, 1):
-        block = slice(1 + n * here.shape[1], 1 + (n + 1) * here.shape[1])
-        rows[model.free.index(name), :, block] = -here
+    left, rows = slopes(lambda x: made.combined(model, x), theta)
     weighted = np.einsum("iac,acd->iad", rows, grams)
-    information = np.einsum("iad,jad->ij", weighted, rows)
-    gradient = np.einsum("iad,ad->i", weighted, v)
     known = {name: (model.scale.get(name, 1.0) / x) ** 2 for name, x in model.prior.items()}
     strength = np.array([known.get(name, 0.0) for name in model.free])
-    gradient += theta * strength
+    # the rotors' noise, taken off, can exceed a combination's power: such data tell nothing
+    told, axes = np.linalg.eigh(np.einsum("iad,jad->ij", weighted, rows))
     # parameters without excitation stay
-    information += np.diag(strength + 1e-8)
-    return np.linalg.solve(information, -gradient), information, rows, v
+    information = (axes * np.maximum(told, 0.0)) @ axes.T + np.diag(strength + 1e-8)
+    gradient = np.einsum("iad,ad->i", weighted, left) + theta * strength
+    return np.linalg.solve(information, -gradient), information, rows, left
 
 
 def _powers(
@@ -273,19 +256,13 @@ def _powers(
     """Return the residual's power (m, 6) in each segment, before the parameters took their share:
     parameters told by few frequencies follow the noise most.
     """
-    here, slopes = jacobian(model, theta, made.names)
-    c, inverse = len(made.names), np.linalg.inv(information)
-    out = []
+    left, rows = (x[..., 1:] for x in slopes(lambda x: made.combined(model, x), theta))
+    inverse, out = np.linalg.inv(information), []
     for s, spectrum in zip(made.segments, spectra, strict=True):
-        columns = s.columns[:, :, 6 : 6 + c]
-        residual = s.columns[:, :, :6] - columns @ here.T
-        moves = np.einsum("kmc,pac->pakm", columns, slopes, optimize=True)
-        for n, name in enumerate(made.nonlinear, 1):
-            late = s.columns[:, :, 6 + c * n : 6 + c * (n + 1)] @ here.T
-            moves[model.free.index(name)] = np.moveaxis(late, 2, 0)
-        moves = moves.reshape(len(information), -1)
-        share = np.einsum("ix,ij,jx->x", moves.conj(), inverse, moves, optimize=True).real
-        leverage = share.reshape(6, *residual.shape[:2]).mean(axis=1).T / spectrum
-        power = (np.abs(residual) ** 2).mean(axis=0)
+        columns = s.columns[:, :, 6:]
+        power = (np.abs(s.columns[:, :, :6] + columns @ left.T) ** 2).mean(axis=0)
+        moves = np.tensordot(columns, rows, (2, 2))  # (tapers, m, p, 6)
+        share = np.einsum("kmia,ij,kmja->kma", moves.conj(), inverse, moves, optimize=True).real
+        leverage = share.mean(axis=0) / spectrum
         out.append(power / (1.0 - np.minimum(leverage, _MOST_LEVERAGE)))
     return out

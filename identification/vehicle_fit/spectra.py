@@ -66,19 +66,16 @@ def residual_spectra(segments: Sequence[Segment], powers: Spectra) -> Spectra:
     over the segments of a log and over frequency, infinite at no power. Segments of a log stand
     together.
     """
-    out = []
-    each = zip(segments, powers, strict=True)
-    for _, group in itertools.groupby(each, key=lambda pair: pair[0].log):
-        of_log = list(group)
-        frequency = np.concatenate([s.frequency for s, _ in of_log])
+    out: Spectra = []
+    pairs = zip(segments, powers, strict=True)
+    for _, group in itertools.groupby(pairs, key=lambda pair: pair[0].log):
+        of_log, each = zip(*group, strict=True)
+        frequency = np.concatenate([s.frequency for s in of_log])
         order = np.argsort(frequency, kind="stable")
-        frequency = frequency[order]
-        power = np.concatenate([p for _, p in of_log])[order]
-        total = np.pad(np.cumsum(power, axis=0), ((1, 0), (0, 0)))
-        for s, _ in of_log:
-            half = 0.5 * np.maximum(_SMOOTHING * s.frequency, _NARROWEST)
-            low = np.searchsorted(frequency, s.frequency - half - 1e-9)
-            high = np.searchsorted(frequency, s.frequency + half + 1e-9, side="right")
-            mean = (total[high] - total[low]) / (high - low)[:, None]
-            out.append(np.where(mean > 0.0, mean, np.inf))
+        total = np.pad(np.cumsum(np.concatenate(each)[order], axis=0), ((1, 0), (0, 0)))
+        half = 0.5 * np.maximum(_SMOOTHING * frequency, _NARROWEST) + 1e-9
+        low, high = np.searchsorted(frequency[order], [frequency - half, frequency + half])
+        mean = (total[high] - total[low]) / (high - low)[:, None]
+        ends = np.cumsum([*map(len, each)])[:-1]
+        out += np.split(np.where(mean > 0.0, mean, np.inf), ends)
     return out

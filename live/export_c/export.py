@@ -17,6 +17,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ... import __version__
+from ...controllers.wind_observation import WIND_PERIOD
 from ...dynamics.effects import get
 from ...dynamics.effects.base import MEMORY, PARAMETERS, ROW_SIZE, Effect
 from ...dynamics.mean_jet import jet_table
@@ -70,7 +71,8 @@ def export_c(
     Args:
         vehicle: the vehicle; its declared effects are part of the filter's model.
         estimator: one of ``ESTIMATORS``.
-        rate: poses a second; default: the vehicle's motion capture's.
+        rate: poses a second; default: the vehicle's motion capture's; with a flight loop the
+            nearest whole number of steps a decision.
         rise_time: s, 10-90 %, of the estimated force and torque.
         gate: as of ``WrenchUKF``.
         policy: from ``exportable_policy``, or None.
@@ -87,7 +89,11 @@ def export_c(
         raise InputError(f"estimator: expected one of {', '.join(ESTIMATORS)}, got {estimator!r}")
     if precision not in PRECISIONS:
         raise InputError(f"precision: expected {' or '.join(PRECISIONS)}, got {precision!r}")
-    rate = vehicle.mocap.rate_hz if rate is None else rate
+    learned = (policy or {}).get("policy")
+    if rate is None:
+        rate = vehicle.mocap.rate_hz
+        if controller or learned:  # a measured rate, such as 101.3 Hz, holds no whole steps
+            rate = max(1, round(WIND_PERIOD * rate)) / WIND_PERIOD
     for name, value in (("rate", rate), ("rise_time", rise_time)):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"{name}: expected a positive number, got {value!r}")
@@ -98,7 +104,6 @@ def export_c(
     made = kind(vehicle, tuning, period, gate, Recovery())
     if controller not in (None, *CONTROLLERS):
         raise unknown_name("controller", str(controller), CONTROLLERS, "--controller")
-    learned = (policy or {}).get("policy")
     flown = policy_numbers(policy, vehicle, tuning, period) if policy and not learned else None
     flight = flight_of(vehicle, period, controller, learned) if controller or learned else None
     f = made.record[0]

@@ -16,6 +16,7 @@ from .base import Address
 _AT_ONCE = 65_536  # bytes of one read from a port
 # bytes of a MAVLink datagram: 14 of the longest messages, far more than a network takes
 _LARGEST = 4096
+_BAUD = 57_600  # baud rate of telemetry radios
 _BUFFER = 4 * 2**20  # bytes waiting for us, if the system allows as many
 
 
@@ -135,10 +136,10 @@ class Datagrams(Link):
 class _SerialPort(Link):
     """A link by a serial port, opened with pyserial."""
 
-    def __init__(self, address: Address, baud: int) -> None:
+    def __init__(self, address: Address) -> None:
         super().__init__(address.text)
         self._path = address.path
-        self._baud = int(address.number("baud", baud, least=1.0))
+        self._baud = int(address.number("baud", _BAUD, least=1.0))
 
     def open(self) -> str:
         """Open the port."""
@@ -167,8 +168,8 @@ def sender_name(sender: Any) -> str:
     return sender if isinstance(sender, str) else "{}:{}".format(*sender)
 
 
-def make_link(address: Address, baud: int) -> Link:
-    """Return the link of an address; ``baud`` is the default of a serial port.
+def make_link(address: Address) -> Link:
+    """Return the link of an address.
 
     Raises:
         InputError: the address is wrong, or there is no such port.
@@ -184,4 +185,4 @@ def make_link(address: Address, baud: int) -> Link:
         )
     if not os.path.exists(address.path):
         raise InputError(f"{address.text}: no such port {address.path}")
-    return _SerialPort(address, baud)
+    return _SerialPort(address)

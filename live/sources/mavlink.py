@@ -36,7 +36,6 @@ from .senders import Senders
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 _OURS = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
-_BAUD = 57_600  # baud rate of telemetry radios
 _PLOTTED = 100_000_000  # ns, between values for plots
 _WANTED = (
     *POSES,
@@ -59,7 +58,7 @@ class Mavlink(Source):
 
     def _prepare(self) -> None:
         need("pymavlink", "mavlink")
-        self.link = make_link(self.address, _BAUD)
+        self.link = make_link(self.address)
         self._rate = self.address.number("rate", 0.0)
         self._reader = MessageReader(self.vehicle, self.address.choice("pose", ("", *POSES)))
         self._senders = Senders(self.name, self.tallies)

@@ -13,8 +13,8 @@ import numpy as np
 
 from ...dynamics.rotation import matrix_of
 from ...dynamics.vehicle import Vehicle
+from ...runtime.arrays import Array
 from ..filtering import Output
-from ..messages import Array
 from .mavlink_messages import HALF_TURN, WRAP
 
 _TILTED = 0.2  # least share of a level vehicle's drag that still measures wind

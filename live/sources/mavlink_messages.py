@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
-from ...identification.logs.flight_log import NORM_TOLERANCE
 from ...identification.logs.what_flew import ORDERS
-from ..messages import Array, Malformed, Measurement
+from ...runtime.arrays import Array
+from ..messages import Malformed, Measurement, normalised
 from .base import unwrapped
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # turns a vector
@@ -97,13 +97,10 @@ class MessageReader:
         """Take a pose in north, east, down, if its kind is read."""
         if not self._chosen(sample.kind, sample.arrival):
             return False
-        turn = np.array(quaternion)
-        length = float(np.linalg.norm(turn))
-        if not abs(length - 1.0) <= NORM_TOLERANCE:
-            raise Malformed("no quaternion")
+        turn = normalised(quaternion)
         # world and body each turn about their own x axis: a quaternion's vector like a position
         sample.position = np.array([m.x, m.y, m.z]) * HALF_TURN
-        sample.quaternion = turn / length * np.append(1.0, HALF_TURN)
+        sample.quaternion = turn * np.append(1.0, HALF_TURN)
         return True
 
     def _odometry(self, m: Any, sample: Measurement) -> bool:
@@ -129,9 +126,9 @@ class MessageReader:
         """Keep an attitude for positions without one."""
         quaternion = np.array([m.q1, m.q2, m.q3, m.q4])
         rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed])
-        good = abs(float(np.linalg.norm(quaternion)) - 1.0) <= NORM_TOLERANCE
-        if not (good and np.isfinite(rates).all()):
-            raise Malformed("no attitude")
+        normalised(quaternion)
+        if not np.isfinite(rates).all():
+            raise Malformed("no body rates")
         if sample.stamp is not None:
             self._attitude = sample.stamp, quaternion, rates
         return False

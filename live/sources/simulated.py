@@ -14,8 +14,9 @@ from ...controllers import make_controller
 from ...envs.fan_tracking import FanTrackingEnv
 from ...envs.plant import NOISE, TICK
 from ...envs.scenarios import SCENARIOS, draw_fan_path, find_scenario
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
-from ..messages import SECOND, Array, Measurement
+from ..messages import SECOND, Measurement
 from .base import WAITS, Source
 
 _AT_ONCE = 0.05  # s of flight caught up at once, at most

@@ -158,9 +158,6 @@ def test_a_recorded_flight_can_be_estimated(call, log, tmp_path):
     wrench = np.genfromtxt(tmp_path / "out" / "wrench.csv", delimiter=",", names=True)
     track = tmp_path / "track.mcap"
     assert call("estimate", log, "--no-smooth", "--no-tune", "--out", track)[0] == 0
-    code, _, error = call("estimate", log, "--no-tune", "--fit-disturbance", "--out", track)
-    assert code == 2
-    assert "leave out --no-tune" in error
     beside = {"track.png", "track.tuning.yaml", "track.run.json", track.name}
     assert beside == {p.name for p in tmp_path.glob("track.*")}
     names = "t fx fy fz tx ty tz std_fx std_fy std_fz std_tx std_ty std_tz nis status"
@@ -215,15 +212,10 @@ def test_a_benchmark_writes_its_leaderboard_and_how_it_came_about(call, tmp_path
     rows = json.loads((out / "leaderboard.json").read_bytes())
     said = [(row["controller"], row["scenario"], row["episodes"], row["seed"]) for row in rows]
     assert said == [("oracle", "static", 1, 7), ("hover", "static", 1, 7)]
-    path = out / "run.json"
-    noted = json.loads(path.read_bytes())["benchmark"]
+    noted = json.loads((out / "run.json").read_bytes())["benchmark"]
     assert noted["command"] == "windwrench " + " ".join(arguments)
     assert (noted["seed"], noted["options"]["jobs"]) == (7, 1)
     assert {"numpy", "mujoco", "scipy"} <= set(noted["packages"])
-    assert call("fly", "--scenario", "static", "--out", "out")[0] == 0
-    both = json.loads(path.read_bytes())
-    assert set(both) == {"benchmark", "fly"}  # results of two commands may share a folder
-    assert both["benchmark"] == noted
 
 
 def test_a_broken_note_is_written_anew(tmp_path):
@@ -235,6 +227,8 @@ def test_a_broken_note_is_written_anew(tmp_path):
     path.unlink()
     write_run(path, "fly", {"seed": 3, "out": Path("x"), "far": float("inf")})
     assert path.read_bytes() == first  # no time stands in it
+    write_run(path, "record", {})
+    assert set(json.loads(path.read_bytes())) == {"fly", "record"}  # they may share a folder
 
 
 def test_plain_values_are_strict_json():
@@ -268,14 +262,11 @@ def test_every_entry_of_the_options_is_an_option_and_its_names_are_there():
 
 
 @needs_command
-@pytest.mark.parametrize(
-    ("words", "offered"),
-    [("windwrench diag", "diagnose"), ("windwrench fly --vehicle ar", "ardrone2")],
-)
-def test_a_shell_completes_commands_and_names(tmp_path, words, offered):
+def test_a_shell_completes_names(tmp_path):
+    words = "windwrench fly --vehicle ar"
     asked = {"_WINDWRENCH_COMPLETE": "complete_bash", "COMP_WORDS": words}
     done = ended(tmp_path, **asked, COMP_CWORD=str(words.count(" ")))
-    assert done.stdout.split() == [offered]
+    assert done.stdout.split() == ["ardrone2"]
 
 
 @needs_command

@@ -41,7 +41,7 @@ VEHICLE = replace(load_vehicle("ardrone2"), omega_lsb=0.0, mocap=Mocap(200.0, 1e
 # where an effect shows; "excite" shows most of them
 FLIGHTS = {"ground_effect": "ground"}
 # one effect of each kind
-SHOWN = ("motor_lag", "rotor_drag", "ground_effect", "slung_payload", "com_offset", "marker_offset")
+SHOWN = ("motor_lag", "rotor_drag", "com_offset", "marker_offset")
 CEILING = replace(VEHICLE, ceiling_z=2.1)  # "excite" comes near it
 LEAST_GAIN = 3.0  # by how much declaring an effect lowers the RMS of the wrench that is left
 

@@ -74,7 +74,12 @@ def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
         "effects": [{"name": "rotor_drag", "coefficients": {"kdx": 1.0e-4, "kdy": 2.0e-4}}],
     }
     vehicle = parse_vehicle(yaml.safe_dump(given))
-    assert vehicle.motor_curve == MotorCurve((0.0, 0.02, 0.1), 2.0, (0.0, 65535.0))
+    curve = MotorCurve((0.0, 0.02, 0.1), 2.0, (0.0, 65535.0))
+    assert vehicle.motor_curve == curve
+    lifted = replace(vehicle, motor_curve=replace(curve, thrust=(0.01, 0.1)))
+    assert_array_equal(
+        lifted.commanded_thrust(np.array([[0.0, -0.1, 1e-9, 0.5]])) > 0.0, [[0, 0, 1, 1]]
+    )
     for name, value in given.items():
         if name not in ("effects", "mocap", "motor_curve"):
             assert_array_equal(getattr(vehicle, name), value)

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from itertools import cycle
 
 import gymnasium as gym
 import numpy as np
@@ -120,7 +121,7 @@ def test_what_is_unknown_is_named(given, said):
         gym.make("windwrench/WindHover-v2", **given)
 
 
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("task", ["FanTracking", "WindTrajectory"])
 def test_a_small_and_a_large_vehicle_find_the_task_as_hard_as_the_standard_one(task):
     """Force over weight, torque over weight times arm, and the error, of 10 s under the flight
     loop alone.
@@ -165,12 +166,8 @@ def numbers(envs, decisions, seed=3):
     return np.array(rows)
 
 
-# each action with each observation, and either on each task
-COMBINED = [
-    (TASKS[(i + j) % len(TASKS)], action, observation)
-    for i, action in enumerate(ACTIONS)
-    for j, observation in enumerate(OBSERVATIONS)
-]
+# each action, observation and task
+COMBINED = [*zip(cycle(TASKS), ACTIONS, cycle(OBSERVATIONS))]
 
 
 @pytest.mark.parametrize(("task", "action", "observation"), COMBINED)

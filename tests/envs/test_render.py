@@ -1,10 +1,9 @@
-"""Pictures, captions and films of the world; each in a fresh process, because MuJoCo chooses its
-OpenGL when it is imported.
+"""Pictures, captions and films of the world, in a fresh process, because MuJoCo chooses its OpenGL
+when it is imported.
 """
 
 import ctypes.util
 import os
-import subprocess
 import sys
 from importlib.util import find_spec
 
@@ -12,31 +11,44 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from tests.support.programs import said
 from tests.support.vector_flights import TASKS
 from windwrench.envs.scene_shapes import ESTIMATED, TRUE
 
-BACKEND = next(
-    (
-        name
-        for library, name in (("EGL", "egl"), ("OSMesa", "osmesa"))
-        if ctypes.util.find_library(library)
-    ),
-    None,
-)
-
 pytestmark = pytest.mark.skipif(
-    BACKEND is None,
+    not any(map(ctypes.util.find_library, ("EGL", "OSMesa"))),
     reason="neither libEGL nor libOSMesa is installed: apt-get install libegl1 libgl1-mesa-dri",
 )
 
-# One process draws all, and is told neither of a display nor how to draw. Gymnasium's checker must
-# not even warn.
+# One process draws all, and is told neither of a display nor how to draw: what the tasks render, one
+# of them in a film by Gymnasium's recorder; an episode of the command; and pictures of parts, in
+# which Gymnasium's checker must not even warn.
 DRAWN = """
-import warnings
+import sys
 import gymnasium as gym
+from gymnasium.wrappers import RecordVideo
+from windwrench.cli import main
+from windwrench.envs import ACTIONS, OBSERVATIONS
+from windwrench.runtime import page_files
+for task, action, observation in zip(TASKS, ACTIONS, OBSERVATIONS):
+    seen = {"action": action, "observation": observation, "width": 64, "height": 48}
+    env = gym.make(f"windwrench/{task}-v2", render_mode="rgb_array", **seen)
+    if FILMS and task == TASKS[0]:
+        env = RecordVideo(env, "film")
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(env.action_space.sample())
+    print(env.render().shape)
+    env.close()
+page_files._DPI = 20
+sys.argv = "windwrench fly --scenario static --gif --film-seconds 0.5 --out out --quiet".split()
+try:
+    main()
+except SystemExit as ended:
+    assert not ended.code
+import warnings
 import numpy as np
 from gymnasium.utils.env_checker import check_env
-import windwrench
 from windwrench.envs import FanTrackingEnv, Scenario
 from windwrench.envs.captions import captioned
 still = Scenario("still", motions=("still",), offset=(0.3, 0.3))
@@ -74,25 +86,15 @@ except Exception as error:
 """
 
 
-def run(folder, code, **changes):
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=folder,
-        env={**os.environ, **changes},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
-    """Pictures, and the words of a machine that cannot draw."""
+    """A folder with films, pictures, and what the program said."""
     folder = tmp_path_factory.mktemp("drawn")
-    said = run(folder, DRAWN, MUJOCO_GL="", DISPLAY="", WAYLAND_DISPLAY="")
-    return np.load(folder / "pictures.npz"), said
+    films = find_spec("moviepy") is not None
+    code = DRAWN.replace("TASKS", repr(TASKS)).replace("FILMS", repr(films))
+    environment = os.environ | dict.fromkeys(("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"), "")
+    told = said(sys.executable, "-c", code, cwd=folder, env=environment)
+    return folder, np.load(folder / "pictures.npz"), told
 
 
 def changed(a, b):
@@ -101,7 +103,7 @@ def changed(a, b):
 
 
 def test_a_picture_has_the_size_asked_for_and_shows_the_vehicle_where_it_is_and_the_fan(drawn):
-    pictures, _ = drawn
+    _, pictures, _ = drawn
     assert (pictures["jet"].shape, pictures["jet"].dtype) == ((240, 320, 3), np.uint8)
     assert changed(pictures["still"], pictures["again"]) == 0.0
     for other in ("without vehicle", "without fan", "moved"):
@@ -109,7 +111,7 @@ def test_a_picture_has_the_size_asked_for_and_shows_the_vehicle_where_it_is_and_
 
 
 def test_a_caption_has_a_colour_for_truth_and_estimate_time_and_error(drawn):
-    pictures, _ = drawn
+    _, pictures, _ = drawn
     first = pictures["captioned"]
     assert first.shape == (240, 320, 3)
     true, estimated = (
@@ -122,25 +124,16 @@ def test_a_caption_has_a_colour_for_truth_and_estimate_time_and_error(drawn):
 
 
 def test_a_machine_that_cannot_draw_is_told_what_to_install(drawn):
-    said = drawn[1]
-    assert said.startswith("InputError")
-    assert "no display" in said
-    assert "MUJOCO_GL" in said
+    last = drawn[2].splitlines()[-1]
+    assert last.startswith("InputError")
+    assert "no display" in last
+    assert "MUJOCO_GL" in last
 
 
-FLY = """
-import sys
-from windwrench.cli import main
-sys.argv = "windwrench fly --scenario static --gif --film-seconds 0.5 --out out".split()
-main()
-"""
-
-
-def test_an_episode_is_written_as_a_gif_that_keeps_the_colours_of_the_arrows(tmp_path):
+def test_an_episode_is_written_as_a_gif_that_keeps_the_colours_of_the_arrows(drawn):
     from PIL import Image
 
-    run(tmp_path, FLY, MUJOCO_GL=BACKEND)
-    out = tmp_path / "out"
+    out = drawn[0] / "out"
     assert {p.name for p in out.iterdir()} == {"fly.gif", "fly.png", "fly.scene.png", "run.json"}
     with Image.open(out / "fly.gif") as gif:
         assert (gif.n_frames, gif.info["duration"], gif.size) == (3, 160, (960, 540))
@@ -152,31 +145,16 @@ def test_an_episode_is_written_as_a_gif_that_keeps_the_colours_of_the_arrows(tmp
         assert np.count_nonzero(force) > 30
 
 
-RECORDED = """
-import gymnasium as gym, windwrench
-from gymnasium.wrappers import RecordVideo
-from itertools import cycle
-from windwrench.envs import ACTIONS, OBSERVATIONS
-for task, action, observation in zip(cycle(TASKS), ACTIONS, cycle(OBSERVATIONS)):
-    seen = {"action": action, "observation": observation, "width": 64, "height": 48}
-    env = gym.make(f"windwrench/{task}-v2", render_mode="rgb_array", **seen)
-    env = RecordVideo(env, action)
-    env.reset(seed=0)
-    for _ in range(3):
-        env.step(env.action_space.sample())
-    env.close()
-"""
+def test_every_task_is_rendered(drawn):
+    """With four actions and observations: pictures are of the world alone."""
+    assert drawn[2].splitlines()[:4] == ["(48, 64, 3)"] * 4
 
 
 @pytest.mark.skipif(
     find_spec("moviepy") is None, reason="moviepy is not installed: pip install 'windwrench[video]'"
 )
-def test_gymnasium_s_recorder_films_every_task_action_and_observation(tmp_path):
-    """Each in one film at least, not all combined: pictures are of the world alone."""
+def test_gymnasium_s_recorder_films_an_episode(drawn):
     import imageio_ffmpeg
 
-    run(tmp_path, RECORDED.replace("TASKS", repr(TASKS)), MUJOCO_GL=BACKEND)
-    films = list(tmp_path.glob("*/*.mp4"))
-    assert len(films) == 5
-    for film in films:
-        assert imageio_ffmpeg.count_frames_and_secs(str(film))[0] == 4
+    (film,) = drawn[0].glob("film/*.mp4")
+    assert imageio_ffmpeg.count_frames_and_secs(str(film))[0] == 4

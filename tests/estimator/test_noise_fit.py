@@ -35,7 +35,7 @@ NOISES = ("thrust_noise", "motor_torque_noise", "position_noise", "attitude_nois
 
 
 @cache
-def run_of(tuning=TRUE, seconds=20.0, seed=0, vehicle=VEHICLE):
+def run_of(tuning=TRUE, seconds=14.0, seed=0, vehicle=VEHICLE):
     """Return a flight drawn from the filter's own model.
 
     Its rotor speeds hold over a step where the fit takes the mean of two rows; with a rate loop of
@@ -59,11 +59,11 @@ def logarithms(tuning):
 
 @pytest.fixture(scope="module")
 def fits():
-    return [fit_noise(VEHICLE, *flight(seed=seed)) for seed in range(3)]
+    return [fit_noise(VEHICLE, *flight(seed=seed)) for seed in range(2)]
 
 
 def test_known_noise_is_found_back_within_its_uncertainty(fits):
-    """Over three flights the eight errors in their own deviations are like 24 normal numbers."""
+    """Over two flights the eight errors in their own deviations are like 16 normal numbers."""
     errors = np.array([(logarithms(fit.tuning) - logarithms(TRUE)) / fit.deviation for fit in fits])
     assert (np.abs(errors) < 3.5).all()
     assert 0.5 < rms(errors) < 1.5
@@ -73,7 +73,7 @@ def test_known_noise_is_found_back_within_its_uncertainty(fits):
         assert (fit.deviation[:4] < 0.4).all()
 
 
-def test_gusts_are_found_back_and_a_walk_stays_one(fits):
+def test_gusts_are_found_back_and_a_walk_stays_one():
     """A wrong thrust, steady, is no gust: along z the force walks."""
     true = replace(TRUE, force_time=(0.2, 0.2, inf), torque_time=0.3)
     fit = fit_noise(VEHICLE, *flight(true), settings=NoiseFitSettings(gusts=True))
@@ -83,11 +83,9 @@ def test_gusts_are_found_back_and_a_walk_stays_one(fits):
     assert abs(np.log(times[2] / 0.3)) < 3.5 * fit.deviation[10]
     assert "Correlation time of the force: " in str(fit)
     assert fit.as_dict()["force_time"][0] == times[0]
-    # the walk that fits best is half the true one, and twice as late
-    assert fit_noise(VEHICLE, *flight(true)).tuning.force_walk[0] < 0.6 * 0.02
-    walk = fit_noise(VEHICLE, *flight(), settings=NoiseFitSettings(gusts=True))
-    assert np.isinf(walk.tuning.force_time)
-    assert_array_equal(walk.tuning.force_walk, fits[0].tuning.force_walk)
+    walk = flight(seconds=5.0)
+    alike = (fit_noise(VEHICLE, *walk, settings=NoiseFitSettings(gusts=x)).tuning for x in (1, 0))
+    assert_array_equal(*(tuning.force_walk for tuning in alike))
 
 
 def test_nis_is_in_its_band_after_the_fit_and_not_before(fits):
@@ -157,7 +155,7 @@ def test_lost_held_and_wild_poses_change_little(fits):
     position[2500:2560] = position[2499]  # held
     quaternion[2500:2560] = quaternion[2499]
     spoiled = fit_noise(VEHICLE, t, speeds, position, quaternion)
-    assert 25 <= spoiled.outliers <= 60
+    assert 17 <= spoiled.outliers <= 42
     apart = (logarithms(spoiled.tuning) - logarithms(clean.tuning)) / clean.deviation
     assert (np.abs(apart) < 2.0).all()
     low, high = chi2_band(6, spoiled.after.poses)
@@ -182,8 +180,8 @@ def test_short_logs_work_or_are_refused_in_one_line():
 
 
 def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
-    log = flight(seconds=30.0)
-    fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=2000))
+    log = flight()
+    fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=1400))
     assert fit.after.poses == len(log[0]) - 200  # figures are those of the whole log
     assert (abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation).all()
 
@@ -222,8 +220,9 @@ def test_rise_times_are_those_of_the_filter(time):
 def test_a_walk_that_is_too_slow_shows_over_a_second_and_not_in_nis():
     """Walks a quarter of the true ones, position noise a little too large: NIS looks consistent."""
     hidden = {"position_noise": 0.00205, "attitude_noise": 0.00305}
+    logs = [flight(seed=seed, seconds=20.0) for seed in range(3)]
     slow = replace(TRUE, **{n: np.asarray(getattr(TRUE, n)) / 4.0 for n in WALKS}, **hidden)
-    found = [consistency_of(VEHICLE, *flight(seed=s), tuning=slow) for s in range(3)]
+    found = [consistency_of(VEHICLE, *log, tuning=slow) for log in logs]
     assert np.mean([each.nis for each in found]) == pytest.approx(6.0, abs=0.1)
     assert all(each.too_slow for each in found)
-    assert not any(consistency_of(VEHICLE, *flight(seed=s), tuning=TRUE).too_slow for s in range(3))
+    assert not any(consistency_of(VEHICLE, *log, tuning=TRUE).too_slow for log in logs)

@@ -182,9 +182,8 @@ SLOW = (("crazyflie", 0.1), ("ardrone2", 0.05))
 LIVES = (
     *(
         (vehicle, kind, dt, gate, fault)
-        for vehicle, dt in (("ardrone2", 0.005), ("crazyflie", 0.01))
+        for (vehicle, dt), gate in ((("ardrone2", 0.005), 0.999), (("crazyflie", 0.01), None))
         for kind in FILTERS
-        for gate in (None, 0.999)
         for fault in POSES
     ),
     *(
@@ -424,10 +423,10 @@ def test_noise_of_poses_is_learned_of_attitude_and_position_apart(kind, noise):
 
 
 def test_the_declared_noise_holds_until_poses_refute_it():
-    """Of 8 flights of 10 s with noise as declared or half as large none widens the noise: the
+    """Of 3 flights of 10 s with noise as declared or half as large none widens the noise: the
     filter is the paper's, bit for bit.
     """
-    for seed in range(8):
+    for seed in range(3):
         for size in (1.0, 0.5):
             said = noisy_hover("ukf", "crazyflie", 0.01, None, (size, size), 10.0, seed=seed)
             variances = np.array([e.std[6] ** 2 for e in said])
@@ -435,7 +434,7 @@ def test_the_declared_noise_holds_until_poses_refute_it():
             assert variances.max() < VEHICLES["crazyflie"].mocap.sigma_pos_m ** 2
 
 
-@pytest.mark.parametrize("gate", [None, 0.99, 0.9999])
+@pytest.mark.parametrize("gate", [None, 0.99])
 @pytest.mark.parametrize("kind", FILTERS)
 def test_a_restart_does_not_bring_the_next(kind, gate):
     """A gap in poses that are twice as noisy as declared: in 1.1.0 each restart after it brought

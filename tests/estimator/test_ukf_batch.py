@@ -57,7 +57,6 @@ def samples():
     ("vehicles", "gate", "tuning"),
     [
         (VEHICLE, None, None),
-        (VEHICLE, 0.999, None),
         (VEHICLE, 0.999, GUSTS),
         (with_effects(1e-4), None, None),
         (
@@ -67,7 +66,7 @@ def samples():
             None,
         ),
     ],
-    ids=["one vehicle", "gated", "gusts", "effects", "one each"],
+    ids=["one vehicle", "gusts and a gate", "effects", "one each"],
 )
 def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate, tuning):
     batch = WrenchUKFBatch(vehicles, COUNT, tuning, gate=gate)

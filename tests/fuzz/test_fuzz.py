@@ -21,7 +21,7 @@ from windwrench.identification.logs.reading import read_log
 
 FORMS = forms()
 # of each form; more are tried with WINDWRENCH_FUZZ_INPUTS=1000 python -m pytest -n0 tests/fuzz
-INPUTS = int(os.environ.get("WINDWRENCH_FUZZ_INPUTS", "15"))
+INPUTS = int(os.environ.get("WINDWRENCH_FUZZ_INPUTS", "10"))
 LONGEST = 10.0  # s of processor time, for one input
 MOST_MEMORY = 4 * 2**30  # bytes, beside what the process has
 COMMANDED = 20  # refused inputs, of which one goes through the whole command

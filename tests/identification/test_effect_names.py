@@ -38,7 +38,7 @@ def flight(name):
     effects = tuple(EffectSetting(k, v) for k, v in truth.items())
     if name == "imu":
         return pose_removed(imu_flight(VEHICLE, effects, 20.0))
-    log = fly_practice(VEHICLE, effects, trajectory, 20.0, seed=3)
+    log = fly_practice(VEHICLE, effects, trajectory, 12.0, seed=3)
     return replace(log, commanded=True) if name == "commanded" else log
 
 

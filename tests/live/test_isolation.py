@@ -8,6 +8,7 @@ import socket
 import subprocess
 import threading
 from contextlib import ExitStack, contextmanager, suppress
+from time import sleep
 
 import numpy as np
 import pytest
@@ -134,7 +135,7 @@ def test_a_terminal_that_stalls_costs_no_estimate(tmp_path):
     told = b""
     while b"status" not in told:
         told += os.read(terminal, 4096)
-    until(lambda: path.exists() and path.read_text().count("\n") >= 1000)
+    until(lambda: path.exists() and path.read_text().count("\n") >= 1000, lambda _: sleep(0.05))
     assert child.poll() is None
     with suppress(OSError):  # of a terminal whose other end is closed
         while piece := os.read(terminal, 4096):

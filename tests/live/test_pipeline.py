@@ -80,7 +80,7 @@ def test_a_tuning_that_is_too_slow_is_told_with_what_to_do():
 
 
 def test_a_clock_that_drifts_changes_nothing_and_is_told():
-    flown = flight(30.0, "gentle")
+    flown = flight(15.0, "gentle")
     live = Pipeline().take(whole(flown, drift=-5e-4))
     assert_allclose(live.wrench(), offline(flown), atol=1e-9, rtol=0)
     assert live.session.clocks.drift == pytest.approx(-500.0, rel=0.1)

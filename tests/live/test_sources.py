@@ -248,10 +248,7 @@ def test_what_is_missing_in_a_senders_count_is_lost_unless_it_was_late(wraps, nu
         (b"hello", "expected a line of JSON"),
         (b"[1, 2]", "1; expected an object"),
         (b"null", "null; expected an object"),
-        (b"[null]", "null; expected an object"),
         (b"[]", "[]; expected an object"),
-        (b"3", "3; expected an object"),
-        (b'"x"', '"x"; expected an object'),
         (b"NaN", "NaN; expected an object"),
         (b"{}", "none of the fields"),
         (b'{"t": NaN, "px": 1}', "nan; expected a time"),
@@ -260,7 +257,6 @@ def test_what_is_missing_in_a_senders_count_is_lost_unless_it_was_late(wraps, nu
         (b'{"t": 1, "\\ud800": 1}', "none of the fields"),
         (b'{"t": 1, "px": 1, "py": 2}', "no field pz"),
         (b'{"t": "soon", "px": 1}', "expected a time"),
-        (b'{"t": 1, "speed": 4}', "none of the fields"),
         (
             b'{"t": 1, "omega1": "fast", "omega2": 1, "omega3": 1, "omega4": 1}',
             "expected a number",
@@ -273,7 +269,7 @@ def test_what_is_no_json_is_refused(data, said):
     assert said in run_text(data).failed[0]
 
 
-@pytest.mark.parametrize("data", [b"null", b"[]", b"hello", b'{"t": 1}', b"[" * 5000])
+@pytest.mark.parametrize("data", [b"null", b"hello", b'{"t": 1}'])
 def test_a_bad_datagram_at_the_beginning_is_counted(data):
     sender = Sender()
     sender.send(data)

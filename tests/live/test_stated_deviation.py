@@ -11,6 +11,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from tests.support.exported_c.compiled import begin, take
+from tests.support.parameters import mostly_slow
 from tests.support.vehicles import VEHICLE
 from windwrench.envs.recording import record_flight
 from windwrench.envs.scenarios import draw_vehicle
@@ -68,7 +69,7 @@ def log_of(flown, **fields):
     return FlightLog(**columns, name="flight", source="flight", **fields)
 
 
-@pytest.mark.parametrize("way", [*ESTIMATORS, "smoothed"])
+@pytest.mark.parametrize("way", mostly_slow([*ESTIMATORS, "smoothed"], lambda way: way != "ukf"))
 def test_errors_of_drawn_vehicles_are_as_large_as_it_says(way, flights):
     """Turbulence is no random walk: of 80 vehicles torque's mean square is 0.49, not 1. It scatters
     by 0.11 over 20 of them.

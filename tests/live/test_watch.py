@@ -69,7 +69,7 @@ def test_a_burst_of_noise_is_no_word(monkeypatch):
 
 
 def test_a_log_with_another_noise_is_told(tmp_path, call, monkeypatch):
-    log = recorded(tmp_path / "flight.csv")
+    log = recorded(tmp_path / "flight.csv", seconds=6)
     monkeypatch.setattr(WrenchEstimate, "noise_scales", shown((1.0, 2.5)), raising=False)
     code, out, said = call("estimate", log, "--no-tune", "--json")
     assert code == 0

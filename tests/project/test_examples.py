@@ -60,10 +60,10 @@ def test_stable_baselines3_trains_on_the_plain_environment(example):
 def test_a_log_becomes_a_vehicle_and_two_controllers_in_c(example, monkeypatch):
     pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
     needs("g++")
-    logs, parts = data_file("crazyflie_imu/log15").parent, "log15:20-32,log16:15.1-21.1"
+    logs = data_file("crazyflie_imu/log15").parent
     script = example("own_vehicle")
     monkeypatch.setattr(script.Hover, "episode_s", 5.0)
-    found = script.main(logs, 64, episodes=1, aboard=1, parts=parts)
+    found = script.main(logs, 64, episodes=1, aboard=1, parts="log15:20-29")
     assert found["lqg in C"] < 0.3
     assert found["policy in C"] == pytest.approx(found["policy"], rel=0.1)
 
@@ -79,10 +79,20 @@ def test_fans_on_paths_of_ones_own_are_followed_and_drawn(example, tmp_path):
     assert (tmp_path / "followed" / "fan_path.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_an_effect_of_ones_own_is_found_with_its_coefficient(example, tmp_path, capsys):
+def asks_for(monkeypatch, script, *effects):
+    """Let a script's diagnoses ask for its own and a few of the kit's effects."""
+    others = {*library.names()} - {*effects}
+    monkeypatch.setattr(script, "diagnose", partial(script.diagnose, without=tuple(others)))
+
+
+def test_an_effect_of_ones_own_is_found_with_its_coefficient(
+    example, tmp_path, capsys, monkeypatch
+):
     with joined(tmp_path):  # and leaves the library again
         assert "tether" not in library.names()
-        found = example("custom_effect").main(seconds=14.0, stiffness=0.12, seed=1)
+        script = example("custom_effect")
+        asks_for(monkeypatch, script, "tether", "constant_force", "rotor_drag")
+        found = script.main(seconds=14.0, stiffness=0.12, seed=1)
     assert found.verdict == "explained"
     assert [effect.name for effect in found.effects] == ["tether"]
     assert found.effects[0].coefficients["k"] == pytest.approx(0.12, rel=0.08)
@@ -90,11 +100,10 @@ def test_an_effect_of_ones_own_is_found_with_its_coefficient(example, tmp_path, 
     assert "tether: k = 0.1" in capsys.readouterr().out
 
 
+@pytest.mark.slow  # of a drag's coefficient in tests/identification/diagnosis, once for each flight
 def test_a_coefficient_is_regressed_on_the_time_of_flights(example, tmp_path, capsys, monkeypatch):
-    """Each flight is asked for two drags alone."""
     script = example("drift_over_flights")
-    others = {*library.names()} - {"rotor_drag", "body_drag"}
-    monkeypatch.setattr(script, "diagnose", partial(script.diagnose, without=tuple(others)))
+    asks_for(monkeypatch, script, "rotor_drag")
     regress = script.main
     flights = tmp_path / "flights"
     flights.mkdir()

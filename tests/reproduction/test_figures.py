@@ -22,18 +22,19 @@ from windwrench.reproduction.result import Comparison, Result
 from windwrench.runtime.provenance import commit, made_by
 
 SHORT = {  # seeds, settings, and constants of the figure's module
-    "fig3": (1, {"seconds": 15.0}, {}),
-    "fig4": (2, {"sweep": (0.5, 1.0)}, {}),
-    "fig5": (2, {"evaluations": 1}, {}),
-    "fig6": (1, {}, {}),
+    "fig3": (1, {"seconds": 8.0}, {}),
+    "fig4": (1, {"sweep": (0.5, 1.0)}, {"_END": 14.0}),
+    "fig5": (1, {"evaluations": 1}, {"_TUNING_SEEDS": (10_001,), "_RESAMPLES": 400}),
+    "fig6": (1, {}, {"HOVER": 3.0}),
     "fig7": (
-        3,
+        2,
         {},
         {
             "GAINS": (12.0, 36.0),
             "SHOWN_GAINS": (18.0,),
             "RISE_TIMES": (0.45,),
             "FAN_SPEEDS": (0.2,),
+            "NOISES": ("gusts",),
             "HALVINGS": 3,
             "REPEATS": 2,
         },

@@ -67,28 +67,31 @@ def test_steady_state_is_exact_after_a_rise_of_a_second():
         assert rise == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_yawing_flight_is_no_wrench():
+@pytest.fixture(scope="module")
+def noisy_flight():
+    return yawing_flight(VEHICLE, 2501, seed=2, substeps=3)
+
+
+def test_a_yawing_flight_is_no_wrench(noisy_flight):
     flight = yawing_flight(VEHICLE, 2501, sigma_position=0.0, sigma_attitude=0.0, substeps=6)
     clean = errors_along(flight)[1200:]
     bounds = np.repeat([2e-3, 5e-5, 1e-3, 1e-3], 3)
     assert_array_less(abs(clean[:, :12]).max(axis=0), bounds)
-    flight = yawing_flight(VEHICLE, 2501, seed=2, substeps=3)
-    errors = errors_along(flight)
+    errors = errors_along(noisy_flight)
     noisy = rms(errors[1200:], axis=0)
     assert_array_less(noisy[:12], np.repeat([6e-3, 0.6e-3, 1e-3, 0.01], 3))
     signs = default_rng(0).choice([-1.0, 1.0], 2501)
-    flipped = flight | {"quaternion": signs[:, None] * flight["quaternion"]}
+    flipped = noisy_flight | {"quaternion": signs[:, None] * noisy_flight["quaternion"]}
     assert_array_equal(errors_along(flipped), errors)
 
 
-def test_missing_measurements_leave_the_wrench_where_it_was():
-    flight = yawing_flight(VEHICLE, 2501, seed=1, substeps=3)
+def test_missing_measurements_leave_the_wrench_where_it_was(noisy_flight):
     random = set(default_rng(3).choice(2501, 1250, replace=False))
-    errors = errors_along(flight, random)[1200:]
+    errors = errors_along(noisy_flight, random)[1200:]
     assert rms(errors[:, :3]) < 8e-3
     assert rms(errors[:, 3:6]) < 1e-3
     # half a second blind, then the pose again
-    errors = errors_along(flight, range(1500, 1600))
+    errors = errors_along(noisy_flight, range(1500, 1600))
     assert abs(errors[1499:1598, :3] - errors[1498, :3]).max() < 1e-12
     assert abs(errors[1499:1598, 6:9]).max() < 0.05
     assert abs(errors[1599:, :3]).max() < 0.15

@@ -60,10 +60,9 @@ def test_a_worker_stays_warm_and_alone(monkeypatch):
     assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
-@pytest.mark.parametrize("count", [1, 2])
-def test_a_death_costs_its_own_task_alone(tmp_path, count):
+def test_a_death_costs_its_own_task_alone(tmp_path):
     tasks = [0, "dies", 1, tmp_path / "mark", "exits", 2]
-    done = dict(outcomes(tasks, count))
+    done = dict(outcomes(tasks, 2))
     assert set(done) == set(tasks)
     assert done["dies"].kind == "died"
     assert "SIGKILL" in done["dies"].words

@@ -60,10 +60,9 @@ CASES = [
     *(f"{command} hard_logs/{x}" for command, logs in HARD.items() for x in logs.split()),
     *(f"{command} {x}" for command, logs in SHARED.items() for x in logs.split()),
 ]
-QUICK = {  # at most 1 s of processor time each
-    *(case for case in CASES if case.startswith("check hard_logs/")),
-    "diagnose hard_logs/healthy_pose_67hz_rows_200hz.csv.gz",
-    "diagnose hard_logs/px4_healthy_mocap48_imu250.ulg",
+QUICK = {  # one of each command, of little processor time; ``compare`` is in ``test_demo.py``
+    "check hard_logs/motive_take.csv.gz",
+    "check hard_logs/px4_one_esc_low.ulg",
     "diagnose crazyswarm2_payload/csv/log165.csv",
     "identify hard_logs/same_motor_four_times.csv.gz",
     "identify motor_faults/TestCase_3_1000000002.ulg",

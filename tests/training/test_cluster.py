@@ -57,6 +57,7 @@ def test_flights_on_a_cluster_are_the_local_ones(cluster):
             assert (a.rmse, a.seed, a.lost) == (b.rmse, b.seed, b.lost)
 
 
+@pytest.mark.slow
 def test_rllib_knows_the_environment_by_its_name(cluster):
     ppo = pytest.importorskip(
         "ray.rllib.algorithms.ppo",

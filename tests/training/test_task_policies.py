@@ -16,7 +16,16 @@ from windwrench.controllers.wind_observation import WIND_PERIOD
 from windwrench.envs.lanes.vector import TaskLanes
 from windwrench.envs.plant import PlantSettings
 from windwrench.evaluation.tasks import TASKS
-from windwrench.training.hindsight import AHEAD, LATE, MIX, WindLesson, lanes_of, mix_of
+from windwrench.training.hindsight import (
+    AHEAD,
+    FAN_MIX,
+    LATE,
+    MIX,
+    MIXES,
+    WindLesson,
+    lanes_of,
+    mix_of,
+)
 from windwrench.training.linear_policy import MEMORY, LinearLaw
 from windwrench.training.task_policies import _card, teach
 from windwrench.training.taught_network import Sequences, TaughtNetwork
@@ -122,6 +131,7 @@ def test_a_mix_has_all_of_its_scenarios():
     rare = dict.fromkeys(("varied", "gusts", "wash", "fan-wall"), 1)
     assert mix_of(MIX, 16) == {"base": 2, "turbulent": 3, "noisy": 5, LATE: 2} | rare
     assert mix_of("calm", 5) == {"calm": 5}
+    assert mix_of(FAN_MIX, 19) == MIXES[FAN_MIX]
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import os
 import pickle
 import shutil
 import zipfile
+from functools import cache
 
 import numpy as np
 import pytest
@@ -59,18 +60,26 @@ def make_env(config, seed=0):
     )
 
 
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """The folder of a run of an algorithm, each run once."""
+
+    @cache
+    def run(algorithm):
+        return train(tiny(algorithm), "base", 3, tmp_path_factory.mktemp(algorithm)).parent
+
+    return run
+
+
 @pytest.mark.parametrize("algorithm", mostly_slow(LEARNERS, {"sac", "recurrent-ppo"}.__contains__))
-def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
+def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, trained, tmp_path):
     config = tiny(algorithm)
-    train(config, "base", 3, tmp_path / "whole")
-    train(config, "base", 3, tmp_path / "parts", stop_after=60)
-    assert not (tmp_path / "parts" / "best.npz").exists()
-    train(config, "base", 3, tmp_path / "parts", stop_after=180)  # in the middle of an episode
-    train(config, "base", 3, tmp_path / "parts")
+    train(config, "base", 3, tmp_path, stop_after=180)  # in the middle of an episode
+    train(config, "base", 3, tmp_path)
     for name in ("best.npz", "last.npz", "best.json", "last.json"):
-        assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
-    a = read_progress(tmp_path / "whole")
-    b = read_progress(tmp_path / "parts")
+        assert (trained(algorithm) / name).read_bytes() == (tmp_path / name).read_bytes()
+    a = read_progress(trained(algorithm))
+    b = read_progress(tmp_path)
     assert (a.steps, a.rmse_m) == (b.steps, b.rmse_m) == ([120, 240], b.rmse_m)
 
 
@@ -78,7 +87,7 @@ def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
 def test_the_shipped_policy_does_what_the_learner_would(algorithm):
     config = tiny(algorithm)
     learner = make_learner(config, make_env(config), 0)
-    learner.learn(120)
+    learner.learn(60)
     policy = TrainedPolicy(card_of(config, "base", 0, 120), weights_of(learner, algorithm))
     policy.reset()
     rng = default_rng(0)
@@ -91,23 +100,23 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
         assert_allclose(policy.act(x), expected[0], atol=1e-5)
 
 
-def test_a_run_says_beside_the_policy_what_it_was_and_another_is_refused(tmp_path):
-    path = train(tiny("sac", "learner.gamma=0.9"), "base", 2, tmp_path)
+def test_a_run_says_beside_the_policy_what_it_was_and_another_is_refused(trained):
+    folder = trained("sac")
     other = tiny("sac", "net=[9]")
     env = make_env(other)
     with pytest.raises(InputError, match="not a checkpoint of this configuration"):
-        load_checkpoint(make_learner(other, env, 0), env, tmp_path / "checkpoint.pt")
-    for config, scenario in ((tiny("sac"), "base"), (tiny("sac", "learner.gamma=0.9"), "fast")):
+        load_checkpoint(make_learner(other, env, 0), env, folder / "checkpoint.pt")
+    for config, scenario in ((tiny("sac", "learner.gamma=0.9"), "base"), (tiny("sac"), "fast")):
         with pytest.raises(InputError, match="another configuration, scenario or seed"):
-            train(config, scenario, 2, tmp_path)
-    card = load_policy(path).card
-    assert (card["algorithm"], card["scenario"], card["seed"]) == ("sac", "base", 2)
-    assert card["config"]["learner"]["gamma"] == 0.9
+            train(config, scenario, 3, folder)
+    card = load_policy(folder / "best.npz").card
+    assert (card["algorithm"], card["scenario"], card["seed"]) == ("sac", "base", 3)
+    assert card["config"] == tiny("sac") != load_config("sac")
     assert card["versions"]["stable-baselines3"] == sb3.__version__
     assert card["seeds"]["training"][1] < card["seeds"]["validation"][0]
-    kept = json.loads((tmp_path / "training.json").read_bytes())
+    kept = json.loads((folder / "training.json").read_bytes())
     assert kept["config"] == card["config"]
-    assert any((tmp_path / "tensorboard").iterdir()) or (tmp_path / "progress.csv").exists()
+    assert any((folder / "tensorboard").iterdir()) or (folder / "progress.csv").exists()
 
 
 def test_every_key_can_be_overridden_and_no_other():
@@ -157,6 +166,7 @@ NAMES = ("checkpoint.pt", "training.json")
 def stopped(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stopped") / "run"
     train(load_config("sac", SHORT), "base", 0, folder, stop_after=60)
+    assert not (folder / "best.npz").exists()
     return folder
 
 

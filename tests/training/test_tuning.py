@@ -42,8 +42,8 @@ def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp
     keep_gains(other, tmp_path / "tuned.yaml", "the command")
     kept = yaml.safe_load((tmp_path / "tuned.yaml").read_text(encoding="utf-8"))
     assert kept["FanTracking2D"]["admittance"]["gains"].keys() == {"gain", "gain_z"}
-    found = tune("admittance", "static", trials=3, episodes=3, seed=1)
-    assert found == tune("admittance", "static", trials=3, episodes=3, seed=1)
+    found = tune("admittance", "static", trials=2, episodes=2, seed=1)
+    assert found == tune("admittance", "static", trials=2, episodes=2, seed=1)
     assert found["rmse_m"] <= found["default_rmse_m"]
     path = tmp_path / "tuned.yaml"
     path.write_text("ratio: {base: {gains: {gain: 5.0}}}\n", encoding="utf-8")

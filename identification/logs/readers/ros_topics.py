@@ -17,7 +17,7 @@ from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS, check_count
 from ..log_map import LogMap, parse_map, stated
 from ..mapped_log import MOTOR_NAMES
-from ..table import Array, Data, Lines, NamedArrays, Noted, Wanted
+from ..table import Array, Data, Lines, NamedArrays, NamedTexts, Noted, Wanted
 from .px4_ulog import unified
 
 Types = Mapping[str, str]  # of messages, by topic
@@ -44,7 +44,7 @@ def map_of(types: Types, given: Stated, source: str, where: str) -> Noted[LogMap
             topic cannot hold its section.
     """
     sections: Data = {}
-    refused: dict[str, str] = {}
+    refused: NamedTexts = {}
     notes: Lines = []
     for section in SECTIONS:
         said = given.get(section) or {}
@@ -182,7 +182,7 @@ def _missing(types: Types, section: str, where: str) -> str:
     return f"{seen}; expected {wanted}. The topics: {topics}"
 
 
-def definitions() -> list[dict[str, str]]:
+def definitions() -> list[NamedTexts]:
     """Return definitions for rosbags' unknown types, in several variants: the newest of each comes
     first.
     """

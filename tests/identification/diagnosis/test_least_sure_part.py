@@ -24,11 +24,8 @@ def fly(name, trajectory="excite", seconds=20.0, seed=1, **coefficients):
     return fly_practice(VEHICLE, (EffectSetting(name, coefficients),), trajectory, seconds, seed)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("thrust_scale", {"s": -0.08}), ("mass", {"dm": 0.05})]
-)
-def test_a_factor_on_thrust_from_commands_alone_is_never_sure(name, value):
-    found = diagnose([replace(fly(name, **value), commanded=True)], VEHICLE)
+def test_a_factor_on_thrust_from_commands_alone_is_never_sure():
+    found = diagnose([replace(fly("mass", dm=0.05), commanded=True)], VEHICLE)
     factors = [e for e in found.effects if e.name in ("thrust_scale", "mass")]
     assert factors
     for effect in factors:
@@ -61,11 +58,13 @@ def test_names_behind_a_filter_are_the_same_but_tentative(name, filtered, coeffi
     assert "perhaps" in headline(found)
     assert found.advice[0].startswith("Log the pose as it was measured")
     assert any("position and attitude were filtered" in note for note in found.notes)
+    assert any("the filter of the pose delays it" in note for note in found.notes)
     (effect,) = (e for e in found.effects if e.name == name)
     for key, value in coefficients.items():
         assert abs(effect.coefficients[key] - value) < max(4.0 * effect.std[key], 0.15 * abs(value))
 
 
+@pytest.mark.slow
 def test_a_filters_delay_is_no_late_motor():
     found = diagnose(
         [FILTERS["causal 10 Hz"](fly_practice(VEHICLE, (), "excite", 20.0, 4), VEHICLE)], VEHICLE
@@ -95,7 +94,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
     assert f"of {flown.log.name}" in remainder_sentence(replace(found, test_logs=("another",)))
 
 
-@pytest.mark.parametrize("turbulence", [0.0, 1.0, 4.0])
+@pytest.mark.parametrize("turbulence", [0.0, 4.0])
 def test_gusts_of_a_steady_strength_are_no_pushes(turbulence):
     log = fly_practice(VEHICLE, seconds=40.0, seed=5, turbulence=turbulence)
     assert transient_disturbances(RegressedFlights([log], VEHICLE), {}) == []

@@ -16,7 +16,7 @@ from windwrench.evidence.trials.logged_poses import FILTERS
 from windwrench.evidence.trials.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.column import Column, Part
-from windwrench.identification.diagnosis.ranking import rank_by_rows
+from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
 from windwrench.identification.diagnosis.rows import Rows
@@ -40,28 +40,23 @@ def weak():
     return RegressedFlights([pose_removed(imu_flight(VEHICLE, (WEAK,), seconds=20.0))], VEHICLE)
 
 
-@pytest.mark.parametrize("trajectory", ["hover", "excite"])
-@pytest.mark.parametrize("missing", [(), (EffectSetting("mass", {"dm": 0.03}),)])
-def test_a_simulator_may_have_no_noise(trajectory, missing):
+def test_a_simulator_may_have_no_noise():
     """An exact pose looks like a filtered one; what is left of it counts for none."""
-    log = fly_practice(VEHICLE, missing, trajectory, 20.0, 1, turbulence=0.0, sensor=0.0)
-    found = diagnose([log], VEHICLE)
-    assert (found.verdict == "nothing to explain") == (not missing)
+    load = (EffectSetting("mass", {"dm": 0.03}),)
+    log = fly_practice(VEHICLE, load, "hover", 12.0, 1, turbulence=0.0, sensor=0.0)
     # of thrust and mass a flight shows the ratio
-    assert {e.name for e in found.effects} <= {"mass", "thrust_scale"}
-    assert len(found.effects) == len(missing)
+    (effect,) = diagnose([log], VEHICLE).effects
+    assert effect.name in ("mass", "thrust_scale")
 
 
-@pytest.mark.parametrize("turns", [0.0, 1e-9])
-def test_a_still_flight_without_noise_is_diagnosed(turns):
+def test_a_still_flight_without_noise_is_diagnosed():
     """Columns that do not vary carry nothing; what is known to the last digit is no more."""
     rng = default_rng(0)
-    count = 3001
+    count = 2101
     place = [0.0, 0.0, 1.0] + 1e-9 * rng.standard_normal((count, 3))
-    attitude = [1.0, 0.0, 0.0, 0.0] + turns * rng.standard_normal((count, 4))
-    log = resting(0.005 * np.arange(count), position=place, quaternion=attitude)
+    log = resting(0.005 * np.arange(count), position=place)
     found = diagnose([log], VEHICLE)
-    assert not any(not e.tentative for e in found.effects)
+    assert all(e.tentative for e in found.effects)
 
 
 def test_an_imu_that_was_read_along_some_axes_counts_as_not_read():
@@ -84,7 +79,7 @@ def test_rows_hold_forces_and_torques(offset):
 
 
 def test_a_centre_of_mass_is_found_behind_a_filter(offset):
-    found = rank_by_rows(offset, LIBRARY, {}, {}, print)
+    found = rank(offset, LIBRARY, print)
     best = found.ranking.sets[0]
     assert best.effects == ("com_offset",)
     assert found.ranking.probability["com_offset"] > 0.95
@@ -93,7 +88,7 @@ def test_a_centre_of_mass_is_found_behind_a_filter(offset):
 
 
 def test_a_weak_rotor_is_found_by_an_imu_alone(weak):
-    found = rank_by_rows(weak, LIBRARY, {}, {}, print)
+    found = rank(weak, LIBRARY, print)
     best = found.ranking.sets[0]
     assert best.effects == ("rotor_efficiency",)
     assert best.coefficients["rotor_efficiency"]["e2"] == pytest.approx(
@@ -106,7 +101,7 @@ def test_a_bias_hides_steady_forces_along_the_body():
     """In a calm hover they show by little else, and torques do not look like a bias."""
     log = pose_removed(imu_flight(VEHICLE, seconds=15.0, trajectory="gentle"))
     flights = RegressedFlights([log], VEHICLE)
-    found = rank_by_rows(flights, [*LIBRARY, "thrust_axis_tilt"], {}, {}, print)
+    found = rank(flights, [*LIBRARY, "thrust_axis_tilt"], print)
     assert found.ranking.sets[0].effects == ()
     biases = [c._replace(part=Part.NUISANCE) for c in flights.biases]
     shown = found.posterior.shown()

@@ -17,9 +17,9 @@ from windwrench.identification.diagnosis.column import Column
 from windwrench.identification.diagnosis.commanded_rotors import TAKE_OFF, in_flight_by_thrust
 from windwrench.identification.diagnosis.log_offsets import LAG_ASYMMETRY, delays_at_bound
 from windwrench.identification.diagnosis.priors import prior_size
-from windwrench.identification.diagnosis.ranking import _starts_of, rank
+from windwrench.identification.diagnosis.ranking import rank
 from windwrench.identification.diagnosis.regression import RegressedFlights
-from windwrench.identification.diagnosis.starting_points import starting_points
+from windwrench.identification.diagnosis.starting_points import _starting_points, starts_of
 from windwrench.identification.diagnosis.traces import ORDER, carrying_channels
 from windwrench.identification.diagnosis.turning_delay import turning_delay
 from windwrench.identification.motion.signals import log_signals
@@ -81,7 +81,7 @@ def test_of_many_starts_those_are_tried_that_resemble_the_flight(tmp_path):
     with joined(tmp_path):
         hose = EffectSetting("hose", {"a": 0.3, "w": 5.0})
         flights = RegressedFlights([fly_practice(VEHICLE, (hose,), "hover", 15.0, seed=1)], VEHICLE)
-        starts = starting_points("hose", flights, flights.residual({}), {})
+        starts = _starting_points("hose", flights, flights.residual({}))
     assert len(starts) < 10
     assert abs(starts[0]["w"] - 5.0) < 0.19
 
@@ -89,7 +89,7 @@ def test_of_many_starts_those_are_tried_that_resemble_the_flight(tmp_path):
 @pytest.mark.parametrize("beside", [[], ["rotor_drag"]])
 def test_a_wind_may_act_on_another_drag_alone(beside):
     flights = RegressedFlights([recorded(seconds=12.0)], VEHICLE)
-    starts = starting_points("wind", flights, flights.residual({}), {}, beside)
+    starts = _starting_points("wind", flights, flights.residual({}), beside)
     assert any(start["cd"] == 0.0 for start in starts) == bool(beside)
 
 
@@ -97,7 +97,7 @@ def test_an_effect_may_start_in_the_place_of_another():
     """A force that is known already leaves nothing of the wind that would explain it."""
     force = {"constant_force": {"fx": 0.3, "fy": 0.0, "fz": 0.0}}
     flights = RegressedFlights([recorded(seconds=12.0, **force)], VEHICLE)
-    found = _starts_of(flights, ["wind"], force, {}).values()
+    found = starts_of(flights, ["wind"], force, {}).values()
     assert any(start["wx"] > 3.0 * abs(start["wy"]) for start in found)
 
 
@@ -160,7 +160,7 @@ APART = 0.008
 
 def unevenly_lagging(commanded):
     """A flight, and its log with the commands that such a lag turns into its rotor speeds."""
-    log = recorded(seed=3)
+    log = recorded(seconds=12.0, seed=3)
     speeds = low_pass(log.rotor_speeds, 30.0, log.period)  # slower, a lag would make up for it
     rate = np.gradient(speeds, log.period, axis=0)
     tau = np.where(rate > 0.0, TAU - APART, TAU + APART)

@@ -83,14 +83,13 @@ def test_a_matlab_file_that_cannot_be_read_says_what_to_do(tmp_path, monkeypatch
         open_table(tmp_path / "a.mat")
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_spoiled_matlab_file_is_refused_or_read(tmp_path, seed):
+def test_a_spoiled_matlab_file_is_refused_or_read(tmp_path):
     """scipy's reader ends its process at some of these."""
     from scipy.io import savemat
 
     savemat(tmp_path / "whole.mat", {"t": T, "log": {"p": PLACE, "about": ["x", "yy"]}})
     good = (tmp_path / "whole.mat").read_bytes()
-    rng = default_rng(seed)
+    rng = default_rng(0)
     data = np.frombuffer(good, np.uint8).copy()
     data[rng.integers(0, 700, 3)] = rng.integers(0, 256, 3)
     (tmp_path / "a.mat").write_bytes(data[: rng.integers(1, 2 * len(data))].tobytes())

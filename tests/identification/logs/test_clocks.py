@@ -95,23 +95,21 @@ def test_of_two_boots_the_longest_is_read_or_the_one_that_is_asked_for(tmp_path)
         read_log(path, piece=3)
 
 
-# rows a second, and rows a pose: all of one vehicle, some of two others
-GRID = [
-    *((200, ratio) for ratio in (1, 2, 3, 5)),
-    *((100, ratio) for ratio in (1, 2, 3)),
-    *((1000, 5), (1000, 10), (50, 1), (50, 2), (40, 1), (20, 1)),
+# rows a second, and rows a pose: more rows than rotor speeds, few poses, and few of both
+FLOWN = [
+    *(("ardrone2", *rates) for rates in ((200, 1), (1000, 10), (20, 1))),
+    ("crazyflie", 100, 2),
+    ("hummingbird", 50, 1),
 ]
-FLOWN = [("ardrone2", *rates) for rates in GRID]
-FLOWN += [(name, *rates) for name in ("crazyflie", "hummingbird") for rates in GRID[2::5]]
 OFFSETS = (-0.15, -0.04, 0.0, 0.1)
 TICK = 0.005
 
 
-@pytest.fixture(scope="module", params=["ardrone2", "crazyflie"])
+@pytest.fixture(scope="module", params=["ardrone2"])
 def flight(request):
     """A vehicle, and a flight of its own without anything missing."""
     vehicle = load_vehicle(request.param)
-    return vehicle, recorded(seconds=40.0, seed=3, vehicle=vehicle)
+    return vehicle, recorded(seconds=30.0, seed=3, vehicle=vehicle)
 
 
 def with_late_pose(log, late, rate=200, ratio=1):
@@ -172,7 +170,7 @@ def test_a_vehicle_s_own_delay_is_no_clock(flight):
         {"motor_lag": {"tau": 0.03}, "latency": {"d": 0.02}},
         {"clock_offset": {"dt": -0.02}},
     ):
-        log = recorded(seconds=40.0, seed=5, vehicle=vehicle, **effects)
+        log = recorded(seconds=20.0, seed=5, vehicle=vehicle, **effects)
         assert on_one_clock(log, vehicle) == (log, ())
 
 

@@ -6,7 +6,7 @@ from tests.support.golden_readings import available, load_golden, recorded
 from tests.support.parameters import mostly_slow
 
 GOLDEN = load_golden()
-QUICK = ("table tests", "file tests", *(f"random {i}" for i in range(6)))
+QUICK = ("table tests", "file tests", *(f"random {i}" for i in range(3)))
 
 
 def cases(way):
@@ -49,7 +49,7 @@ def test_a_measured_file_raises_the_doubts_that_it_raised(case):
 @pytest.mark.parametrize(
     ("case", "every"),
     [
-        ("hostile 0", 3),
+        ("hostile 0", 13),
         *(
             pytest.param(case, 1, marks=pytest.mark.slow)
             for case in GOLDEN

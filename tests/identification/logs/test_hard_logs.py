@@ -1,4 +1,4 @@
-"""Logs of kinds that were read wrongly, with their right readings."""
+"""Logs of kinds that were read wrongly, with what ``tests/golden/logs.json`` does not keep."""
 
 from dataclasses import replace
 
@@ -8,7 +8,6 @@ import pytest
 from tests.support.data_paths import data_file
 from tests.support.hostile_conventions import (
     DOWN,
-    NED,
     ONE,
     conjugate,
     framed,
@@ -16,7 +15,6 @@ from tests.support.hostile_conventions import (
 )
 from tests.support.outcomes import refused
 from windwrench.dynamics import load_vehicle
-from windwrench.identification import diagnose
 from windwrench.identification.logs.clocks import on_one_clock
 from windwrench.identification.logs.flight_log import with_rows
 from windwrench.identification.logs.inertial import check_inertial
@@ -25,18 +23,10 @@ from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.report.log_check import check_log
 
 
-@pytest.mark.parametrize(
-    "name", ["actuator_only", "bf_erpm100_names.bbl", "px4_gz_rads_as_rpm.ulg", "matlab_struct.mat"]
-)
+@pytest.mark.parametrize("name", ["actuator_only", "matlab_struct.mat"])
 def test_rotor_speeds_are_in_rad_s(name):
     log = read_log(data_file(f"hard_logs/{name}"), vehicle=load_vehicle("ardrone2"))
     assert 360.0 < np.median(log.rotor_speeds) < 420.0
-
-
-def test_rounded_times_are_even():
-    log = read_log(data_file("hard_logs/time_two_decimals.csv.gz"))
-    assert np.ptp(np.diff(log.t)) < 1e-9
-    assert log.period == pytest.approx(0.005, rel=1e-3)
 
 
 def test_rounded_rotor_speeds_of_a_smooth_flight_come_with_each_row():
@@ -52,14 +42,14 @@ def mended_log():
     return with_rows(log, np.isfinite(log.gyro[:, 0]))
 
 
-LATE = (-30, -3, 3, 6)  # rows
+LATE = (-30, 3)  # rows
 
 
 @pytest.mark.parametrize(
     ("whose", "names", "rows"),
     [
         *(("IMU", ("gyro", "accelerometer"), rows) for rows in LATE),
-        *(("IMU", ("accelerometer",), rows) for rows in (-30, 6)),
+        ("IMU", ("accelerometer",), 6),
         *(("pose", ("position", "quaternion"), rows) for rows in LATE),
     ],
 )
@@ -87,18 +77,6 @@ def test_an_imu_whose_clock_jumps_is_left_out(mended_log):
     assert "s in turn against the pose" in notes[0]
 
 
-@pytest.mark.parametrize(("name", "late"), [("pose_late_40", 0.04), ("pose_late_80", 0.08)])
-def test_a_late_pose_is_a_clock_and_no_lag(name, late):
-    vehicle = load_vehicle("ardrone2")
-    log = read_log(data_file(f"hard_logs/{name}.csv.gz"), vehicle=vehicle)
-    (note,) = (note for note in log.notes if "the pose is" in note)
-    assert float(note.split(" s late")[0].split()[-1]) == pytest.approx(late, abs=0.003)
-    if name == "pose_late_80":
-        found = diagnose([log], vehicle)
-        assert found.effects == ()
-        assert found.remainder == "none"
-
-
 def test_a_simulation_that_blew_up_is_no_flight_in_milli_g():
     log = read_log(data_file("hard_logs/perfect_model_gusts_10mN_imu.csv.gz"))
     growth = 0.3 * np.exp(np.minimum(log.t, 12.0))
@@ -124,16 +102,8 @@ NORTH_EAST_DOWN = np.array(
             r"attitude is north, east, down .* but the position east, north, up",
         ),
         (
-            lambda log: framed(log, NORTH_EAST_DOWN),
-            r"position is north, east, down but .* take \(py, px, -pz\) as the position",
-        ),
-        (
             lambda log: permuted(conjugate(log), [3, 1, 0, 2]),
             r"quaternion is world to body; .* \(qw, qx, qy, qz\); the rotors .* 4,2,1,3 .*px4-x",
-        ),
-        (
-            lambda log: permuted(framed(log, *NED), [2, 3, 1, 0]),
-            r"world is z down .*; the rotors look permuted: .* rotors 3,4,2,1 .*betaflight",
         ),
     ],
 )
@@ -142,15 +112,13 @@ def test_an_advice_leaves_a_consistent_log(change, expected):
     vehicle = load_vehicle("ardrone2")
     log = read_log(data_file("hard_logs/perfect_model_gusts_10mN.csv.gz"), vehicle=vehicle)
     with refused(expected):
-        screen_log(change(log), vehicle)
+        screen_log(change(with_rows(log, log.t < 15.0)), vehicle)
 
 
 @pytest.mark.parametrize(
     ("name", "doubt"),
     [
-        ("px4_mocap_enu_unturned.ulg", "the world is z down"),
         ("ned_quaternion_swapped.csv.gz", "the body axes are right, forward, up"),
-        ("asctec_plus.csv.gz", ""),
         ("perfect_model_gusts_30mN.csv.gz", ""),
     ],
 )

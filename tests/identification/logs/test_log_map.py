@@ -204,6 +204,16 @@ def test_rows_whose_times_were_rounded_are_even(tmp_path):
     assert noted(log, "the rows were taken as even in time")
 
 
+def test_rows_written_twice_are_rows_once(tmp_path):
+    """Two equal rows at one time are no two samples at rounded times."""
+    twice = np.arange(40) // 2
+    columns = {"t": 0.01 * twice, "x": np.sin(twice), "m1": 3600.0 + twice}
+    changes = {name: [f"{x:.6f}" for x in column] for name, column in columns.items()}
+    log = mapped(table(tmp_path / "a.csv", changes))
+    assert_allclose(log.t, 0.01 * np.arange(20))
+    assert noted(log, "20 row(s) repeat a time and were joined to the one row")
+
+
 def test_columns_named_as_motors_are_said_where_they_are_left_out(tmp_path):
     more = {f"esc_{i}_rpm": 3600.0 for i in range(1, 5)} | dict.fromkeys(
         ("x1", "x2", "x3", "x4"), 1

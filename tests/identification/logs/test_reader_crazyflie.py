@@ -1,17 +1,14 @@
-"""A Crazyflie's SD-card logs and tables of its log variables: real SD-card logs, read from where
-they lie, and synthetic ones.
+"""A Crazyflie's SD-card logs and tables of its log variables, written here; real ones are in
+``tests/golden/logs.json``.
 """
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.linalg import norm
 from numpy.testing import assert_allclose
-from scipy.signal import butter, filtfilt
 
 from tests.support.autopilot_flight import assert_inertial, assert_motion, inertial, motion
-from tests.support.data_paths import data_file
 from tests.support.map_tables import table_text
 from tests.support.outcomes import noted, refused
 from tests.support.sd_card_writer import sd_card, sd_card_before_2021
@@ -171,27 +168,3 @@ def test_a_table_of_log_variables(tmp_path, time, unit):
     assert "reader crazyflie_csv" in log.source
     assert_motion(log, log.t[log.valid] + T[0], 3e-3, 3e-3)
     assert_allclose(log.command[0], OURS / 65535, atol=1e-6)
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize(("number", "axes"), [(15, (0, 1)), (16, (2,))])
-def test_real_logs_turn_as_their_motors_say(number, axes):
-    """Units, axes and the motors' order: angular accelerations follow the commands 40 ms later
-    (roll and pitch are excited in log15, yaw in log16), and a vehicle that stands feels gravity.
-    """
-    log = read_log(data_file(f"crazyflie_imu/log{number}"))
-    assert not log.has_pose
-    assert 980.0 < 1.0 / log.period < 1030.0
-    assert not noted(log, "damaged")
-    still = norm(log.accelerometer[log.command.max(axis=1) == 0.0], axis=1)
-    assert_allclose(np.median(still), 9.81, atol=0.3)
-    b, a = butter(2, 8.0 / 500.0)
-    turn = np.gradient(filtfilt(b, a, np.nan_to_num(log.gyro), axis=0), log.t, axis=0)
-    command = filtfilt(b, a, log.command, axis=0)
-    flying = command.min(axis=1) > 0.1
-    torque = command @ np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1]]).T
-    for axis in axes:
-        delay = 40 if axis < 2 else 0
-        a = turn[flying][delay:, axis]
-        b = torque[flying][: flying.sum() - delay, axis]
-        assert np.corrcoef(a, b)[0, 1] > 0.85

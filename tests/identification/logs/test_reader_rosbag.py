@@ -175,8 +175,10 @@ def test_the_only_topics_that_fit_are_taken(write, kind):
         assert_flight(read(next(path.glob(f"*.{kind}"))))
 
 
-@pytest.mark.parametrize("kind", ["bag", "mcap"])
-@pytest.mark.parametrize("shape", ["PoseStamped", "TransformStamped", "Odometry"])
+@pytest.mark.parametrize(
+    ("kind", "shape"),
+    [("bag", "PoseStamped"), ("mcap", "TransformStamped"), ("bag", "Odometry")],
+)
 def test_a_map_states_topics_frames_units_and_order(write, kind, shape):
     def rpm(t):
         return {"data": PX4 * growth(t) * 30 / pi}
@@ -194,9 +196,8 @@ def test_a_map_states_topics_frames_units_and_order(write, kind, shape):
     assert "frames: world ned, body frd" in log.notes
 
 
-@pytest.mark.parametrize("kind", ["bag", "mcap"])
-def test_an_imu_is_taken_in_the_frame_that_the_map_states(write, kind):
-    path = write(FLIGHT | {"/imu": imu(FLIP)}, kind)
+def test_an_imu_is_taken_in_the_frame_that_the_map_states(write):
+    path = write(FLIGHT | {"/imu": imu(FLIP)})
     log = read_log(path, None, VEHICLE)  # REP 145 has an IMU forward, left, up
     assert_allclose(log.gyro, inertial(log.t)[0] @ FLIP, atol=2e-3)
     assert "frames: world enu, body flu" in log.notes
@@ -217,8 +218,7 @@ def test_messages_of_px4_of_several_years(write, variant):
     assert noted(log, "motors as on px4-x, which the bag does not state")
 
 
-@pytest.mark.parametrize("kind", ["bag", "mcap"])
-def test_messages_of_mavros(write, kind):
+def test_messages_of_mavros(write):
     pulses = np.array([*(1000 + 1000 * SHARE[THEIRS]), 0, 0])
     topics = {
         "/mavros/local_position/pose": pose(),
@@ -227,7 +227,7 @@ def test_messages_of_mavros(write, kind):
         "/mavros/imu/data_raw": imu(),
         "/mavros/rc/out": of_mavros("RCOut", channels=np.round(pulses)),
     }
-    log = read_log(write(topics, kind))
+    log = read_log(write(topics, "bag"))
     assert_motion(log, log.t)
     assert_inertial(log, log.t)
     assert_allclose(log.command, np.tile(SHARE, (len(T), 1)), atol=1e-3)
@@ -237,7 +237,7 @@ def test_messages_of_mavros(write, kind):
     assert "/mavros/imu/data (sensor_msgs/msg/Imu), chosen by its name before" in text
     items = [{"rpm": round(w * 30 / pi)} for w in PX4]
     topics |= {"/mavros/esc_status": of_mavros("ESCStatus", esc_status=items)}
-    log = read_log(write(topics | {"/vrpn/drone/pose": pose()}, kind, name="second"))
+    log = read_log(write(topics | {"/vrpn/drone/pose": pose()}, name="second"))
     assert_allclose(log.rotor_speeds[0], OURS, atol=0.06)
     assert noted(log, "/vrpn/drone/pose", "chosen by its name before")
 
@@ -315,7 +315,6 @@ def test_times_that_are_no_use_are_replaced_or_left_out(write, topics, delay, sa
     assert noted(log, said)
 
 
-@pytest.mark.parametrize("kind", ["bag", "mcap"])
 @pytest.mark.parametrize(
     ("topics", "expected"),
     [
@@ -324,13 +323,13 @@ def test_times_that_are_no_use_are_replaced_or_left_out(write, topics, delay, sa
         (FLIGHT | {"/a": pose(times=[0.0])}, r"/a: 1 message\(s\); expected at least two"),
         (FLIGHT | {"/motors": motors(times=WIDE + 9)}, "do not overlap"),
         (FLIGHT | {"/motors": motors([1, 2, nan, 3])}, "no two samples have four finite"),
-        ({}, "(cannot be read as a ROS|The topics: none)"),
+        ({}, "The topics: none"),
     ],
 )
-def test_what_is_missing_is_named(write, kind, topics, expected):
+def test_what_is_missing_is_named(write, topics, expected):
     """What is wrong with topics and maps alone is in the golden lines of Python's errors."""
     with refused(f"flight.*: .*{expected}"):
-        read(write(topics, kind))
+        read(write(topics, "mcap"))
 
 
 def logged(name):
@@ -449,8 +448,7 @@ def test_files_and_messages_packed_one_by_one_are_refused(mode, write):
         read(path)
 
 
-@pytest.mark.parametrize("kind", ["db3", "mcap"])
-@pytest.mark.parametrize("has_metadata", [True, False])
+@pytest.mark.parametrize(("kind", "has_metadata"), [("db3", False), ("mcap", True)])
 def test_the_folder_one_stands_in_is_a_bag(kind, has_metadata, write, monkeypatch):
     """With the map beside the folder, and without the metadata where one file is all there is."""
     path = write({"/a": pose(), "/b": pose(), "/m": motors()}, kind, topic_map="position: /b")

@@ -13,14 +13,13 @@ from numpy.linalg import norm
 from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
-from tests.support.data_paths import crazyswarm2_file
 from tests.support.flown import VEHICLE, noisy, recorded, resting, without_pose
 from tests.support.hostile_conventions import permuted
 from tests.support.outcomes import refused
 from tests.support.parameters import mostly_slow
 from tests.support.sizes import rms
-from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
+from windwrench.dynamics.vehicle import ModelStatus
 from windwrench.evidence.trials.practice_flights import practise
 from windwrench.identification.logs.evidence import Evidence, log_ranking
 from windwrench.identification.logs.flight_log import with_rows, write_log
@@ -32,7 +31,7 @@ from windwrench.identification.wrench_series import estimate_log
 
 CLEAN = ("excite", "gentle", "circle", "yaw")
 # one effect of each kind
-SHOWN = ("motor_lag", "rotor_drag", "slung_payload", "marker_offset", "clock_offset")
+SHOWN = ("motor_lag", "rotor_drag", "slung_payload")
 EXCITED = [CLEAN[0], pytest.param("yaw", marks=pytest.mark.slow)]
 
 
@@ -75,10 +74,8 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
 @pytest.mark.parametrize(
     ("columns", "signs", "expected"),
     [
-        ((2, 1, 0), (1, 1, 1), "px and pz are swapped"),
         ((1, 2, 0), (1, 1, 1), r"take \(pz, px, py\) as the position"),
         ((1, 0, 2), (-1, -1, 1), r"take \(-py, -px, pz\) as the position"),
-        ((0, 1, 2), (1, 1, -1), r"position's z points down; expected .* take \(px, py, -pz\)"),
     ],
 )
 @pytest.mark.parametrize("trajectory", EXCITED)
@@ -89,6 +86,25 @@ def test_position_columns_along_any_axes_are_named(trajectory, columns, signs, e
     log = flight(trajectory)
     with refused(expected):
         screen_log(replace(log, position=log.position[:, list(columns)] * signs), VEHICLE)
+
+
+def test_positions_in_feet_are_named():
+    log = flight()
+    with refused("px, py, pz look like feet; expected metres: divide them by 3.281"):
+        screen_log(replace(log, position=log.position / 0.3048), VEHICLE)
+
+
+def test_a_leap_of_the_position_is_no_other_convention():
+    """The position hangs for 3 s, or motion capture moves its origin: no column is swapped."""
+    log = flight("yaw")
+    for held in (0.0, 3.0):
+        position = log.position.copy()
+        position[(log.t > 6.0 - held) & (log.t <= 6.0), 0] = position[log.t > 6.0 - held][0, 0]
+        position[log.t > 6.0, 0] += 1.5
+        leaping = replace(log, position=position)
+        with refused("the pose leaps by .* m within 0.005 s at t = 6"):
+            screen_log(leaping, VEHICLE)
+        assert any("the pose leaps" in note for note in screen_log(leaping, VEHICLE, None)[1])
 
 
 @pytest.mark.parametrize("effect", mostly_slow(names(), SHOWN.__contains__))
@@ -108,19 +124,6 @@ def test_a_quiet_hover_decides_nothing():
     log = replace(log, position=position, quaternion=quaternion)
     assert screen_log(log, VEHICLE)[1] == ()
     assert Evidence.of_log(log, VEHICLE).fit(DECLARED).torque > 0.5  # there is nothing to tell
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize(
-    "number",
-    mostly_slow(
-        [100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204], {100, 176}.__contains__
-    ),
-)
-def test_short_measured_flights_pass_where_short_is_enough(number):
-    vehicle = load_vehicle("crazyflie")
-    log = read_log(crazyswarm2_file(number), "crazyswarm2", vehicle)
-    screen_log(log, vehicle, least_seconds=3.0)
 
 
 def jumped_clock(log):
@@ -270,6 +273,8 @@ def test_rotors_that_stop_or_race_are_named():
 def test_another_vehicle_than_the_log_names_is_doubted():
     _, (note,) = screen_log(replace(flight(), vehicle="crazyflie"), VEHICLE)
     assert note == "warning: the log names the vehicle crazyflie; it is read as ardrone2"
+    own = replace(VEHICLE, status=ModelStatus(coefficients={"k": "identified"}))
+    assert screen_log(replace(flight(), vehicle="crazyflie"), own)[1] == ()
 
 
 def test_a_log_names_its_vehicle(tmp_path):

@@ -97,6 +97,25 @@ def said(*effects, unknown=0.1, **more):
     return headline(found).replace("\N{NO-BREAK SPACE}", " ").split(" Held-out")[0]
 
 
+@pytest.mark.parametrize(
+    ("after", "told"),
+    [
+        ((0.0550, 0.0011), "torque error: 2.10 mNm before, 1.10 mNm after (noise floor 1.90 mNm)."),
+        (
+            (0.0250, 0.0005),
+            "torque error: 2.10 mNm before, 0.500 mNm after (noise floor 1.90 mNm); "
+            "force error: 55.1 mN before, 25.0 mN after (noise floor 19.0 mN).",
+        ),
+        ((0.0550, math.nan), "force error: 55.1 mN before, 55.0 mN after (noise floor 19.0 mN)."),
+    ],
+)
+def test_the_errors_that_fall_are_told(after, told):
+    before, after = (Errors(*error, 7.1, 0.05) for error in ((0.0551, 0.0021), after))
+    found = made_diagnosis(before=before, after=after)
+    sentences = headline(found).replace("\N{NO-BREAK SPACE}", " ")
+    assert sentences.partition(" Held-out ")[2] == told
+
+
 def test_causes_stand_by_their_energy():
     sag, mass, scale, wind = (
         replace(effect, evidence={"energy_explained": energy})

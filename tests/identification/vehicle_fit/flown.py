@@ -1,5 +1,6 @@
 """Flights for the tests: a rigid body with an IMU, integrated here, and the plant's."""
 
+from functools import cache
 from math import nan, pi
 
 import numpy as np
@@ -18,7 +19,8 @@ Y = ARM * np.array([1, 1, -1, -1.0])
 FULL = 900.0  # rad/s at full command
 
 
-def inertial_flights(seeds, seconds=15.0, lag=0.05, rate=250):
+@cache
+def inertial_flights(seeds=range(4), seconds=10.0, lag=0.05, rate=250):
     """Return, for each seed, an IMU log with commands and without a pose, and its rotor speeds
     (n, 4). Commands swing on their own, so nothing is fed back; a slow yaw shows gyroscopic torque.
     """

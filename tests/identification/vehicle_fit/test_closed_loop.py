@@ -17,7 +17,7 @@ from windwrench.identification.vehicle_fit.closed_loop import UNITS, fit_loop
 CRAZYFLIE = load_vehicle("crazyflie")
 STATUS = ModelStatus("identified", "refuted")
 WHOLE = LoopReaction(1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-DAMPED = replace(WHOLE, yaw_gain=0.0, unmeasured=1e6, damping=5.0, yaw_damping=3.0)
+DAMPED = LoopReaction(0.0, 0.0, 0.0, 1e6, 5.0, 0.0, 0.0, 0.0, 3.0)
 LOOP = LoopReaction(0.4, 0.6, 0.3, 25.0, 6.0, 15.0, 4.0, 1.5, 5.0)
 
 
@@ -63,14 +63,16 @@ def test_a_file_keeps_the_loop():
     assert again.status.torque == "refuted"
 
 
-def test_a_known_loop_comes_back(log):
+@pytest.mark.parametrize(("loop", "fitted"), [(LOOP, 9), (DAMPED, 2)])
+def test_a_known_loop_comes_back(log, loop, fitted):
     starts = logged_starts(log, CRAZYFLIE, [(log.t[0], log.t[-1])], 0.5)
     segment = np.arange(len(starts.rows)) // 8
-    made = starts._replace(segment=segment, seen=starts.flown(with_loop(LOOP)))
-    fit = fit_loop([made], with_loop(None))
+    made = starts._replace(segment=segment, seen=starts.flown(with_loop(loop)))
+    fit = fit_loop([made], with_loop(None), damped=fitted == 2)
     found = dict(zip(UNITS, astuple(fit.loop), strict=True))
-    for name, value in zip(UNITS, astuple(LOOP), strict=True):
+    for name, value in zip(UNITS, astuple(loop), strict=True):
         assert found[name] == pytest.approx(value, rel=0.1, abs=0.05), name
-    without = fit_loop([made.those(segment > 1)], with_loop(None), fit.loop)
+    without = fit_loop([made.those(segment > 1)], with_loop(None), fit.loop, fitted == 2)
     assert astuple(without.loop) == pytest.approx(astuple(fit.loop), rel=0.1, abs=0.1)
-    assert (fit.deviations > 0.0).all()
+    other = fit_loop([starts._replace(segment=segment)], with_loop(None), fit.loop, fitted == 2)
+    assert (other.deviations > 0.0).sum() == fitted

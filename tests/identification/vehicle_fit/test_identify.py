@@ -37,31 +37,29 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
-from windwrench.identification.vehicle_fit.columns import Drive
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, standing
 from windwrench.identification.vehicle_fit.identify import identify
+from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
 from windwrench.identification.vehicle_fit.report import explained, use_of
-from windwrench.identification.vehicle_fit.result import IDENTIFIED, Estimate
 from windwrench.identification.vehicle_fit.solve import nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
 
 GIVEN = parse_geometry(str(ARM))
-GAZEBO = parse_geometry("0.1262")
 HOVER = np.sqrt(MASS * 9.81 / (4 * K)) / FULL  # command
 
 
-def of_crazyflie(logs):
-    return identify(logs, CRAZYFLIE.mass, parse_geometry(str(CRAZYFLIE.arm_l)))
+def of_crazyflie(logs, windows=None):
+    return identify(logs, CRAZYFLIE.mass, parse_geometry(str(CRAZYFLIE.arm_l)), windows)
 
 
 @pytest.fixture(scope="module")
 def commanded():
     lag = {"motor_lag": {"tau": 0.06}}
-    return [recorded(t, 15.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "shake", "yaw")]
+    return [recorded(t, 15.0, vehicle=CRAZYFLIE, **lag) for t in ("excite", "yaw")]
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +69,7 @@ def identified(commanded):
 
 @pytest.fixture(scope="module")
 def inertial():
-    return inertial_flights(range(8))
+    return inertial_flights()
 
 
 def check(found, name, truth, within):
@@ -108,7 +106,7 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(identified):
 def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from():
     """Its file states the step of the speeds and no fastest one: 255 steps are no limit."""
     step = 3.490658
-    log = recorded("shake", 15.0, vehicle=CRAZYFLIE)
+    log = recorded("shake", 11.0, vehicle=CRAZYFLIE)
     log = replace(log, rotor_speeds=step * np.round(log.rotor_speeds / step))
     assert np.median(log.rotor_speeds) > 1.5 * 255 * step
     again = parse_vehicle(dump_vehicle(of_crazyflie([log]).vehicle))
@@ -127,15 +125,16 @@ def test_noise_of_rotor_speeds_is_no_torque():
 
     logs = [recorded(name, 40.0, vehicle=CRAZYFLIE) for name in ("excite", "shake")]
     found = of_crazyflie([replace(x, rotor_speeds=x.rotor_speeds * shaken(x)) for x in logs])
-    check(found, "Jxx", CRAZYFLIE.inertia[0, 0], 0.05)
-    check(found, "Jyy", CRAZYFLIE.inertia[1, 1], 0.05)
+    # 3.5 and 2.4 % off where it is left out of the model
+    check(found, "Jxx", CRAZYFLIE.inertia[0, 0], 0.02)
+    check(found, "Jyy", CRAZYFLIE.inertia[1, 1], 0.02)
 
 
 def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
     """Its moment goes with forward velocity times yaw rate, and took 7 % off Jzz and p/k."""
     bird = load_vehicle("hummingbird")
     air = {"translational_lift": {"kh": 3.4e-3}, "rotor_drag": {"kdx": 1.2e-4, "kdy": 1.2e-4}}
-    logs = [recorded(name, vehicle=bird, **air) for name in ("excite", "yaw")]
+    logs = [recorded(name, 12.0, vehicle=bird, **air) for name in ("excite", "yaw")]
     found = identify(logs, bird.mass, parse_geometry(str(bird.arm_l)))
     check(found, "Jzz", bird.inertia[2, 2], 0.03)
     check(found, "p/k", bird.p[0] / bird.k[0], 0.03)
@@ -143,7 +142,7 @@ def test_lift_at_the_rotors_is_not_taken_for_a_gyroscopic_torque():
 
 
 def test_a_hover_does_not_show_what_it_does_not_excite():
-    found = of_crazyflie([recorded("hover", 12.0, vehicle=CRAZYFLIE)])
+    found = of_crazyflie([recorded("hover", 6.5, vehicle=CRAZYFLIE)])
     assert found.estimates["Jzz"].status == "assumed"
     assert found.estimates["motor_lag"].status == "not identifiable"
     assert any("Yaw at" in line for line in found.advice)
@@ -152,7 +151,7 @@ def test_a_hover_does_not_show_what_it_does_not_excite():
 
 def test_an_imu_and_commands_are_enough():
     found = vehicles()["imu and commands"]
-    assert found.sources.force == "accelerometer"
+    assert found.fit.model.sources.force == "accelerometer"
     check(found, "hover command", HOVER, 0.05)
     check(found, "thrust(0.5)", K * (0.5 * FULL) ** 2, 0.05)
     check(found, "Jxx", INERTIA[0, 0], 0.05)
@@ -178,17 +177,6 @@ def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
     assert found.vehicle.motor_curve.voltage_exponent == found.estimates["voltage_exponent"].value
 
 
-def test_without_a_discharge_voltage_and_curve_are_not_told_apart(inertial):
-    log, _ = inertial[0]
-    same = identify(
-        [replace(log, voltage=np.full(len(log.t), 3.9))], MASS, parse_geometry(str(ARM))
-    )
-    assert same.estimates["voltage_exponent"].status == "not identifiable"
-    assert "hardly changes" in same.estimates["voltage_exponent"].how
-    assert any("with a full and with an empty battery" in line for line in same.advice)
-    assert same.vehicle.motor_curve.voltage_exponent == 0.0
-
-
 def test_tapers_lose_what_the_intervals_add():
     """A regression of white noise on white noise, of density 0.01: its variance by its weight."""
     rng = default_rng(0)
@@ -201,9 +189,9 @@ def test_tapers_lose_what_the_intervals_add():
 
 
 @pytest.mark.slow
-def test_intervals_hold_the_truth_about_as_often_as_they_say(inertial):
+def test_intervals_hold_the_truth_about_as_often_as_they_say():
     held = []
-    for log, speeds in inertial:
+    for log, speeds in inertial_flights(range(8), 15.0):
         log = replace(log, rotor_speeds=speeds, command=None)
         found = identify([log], MASS, GIVEN)
         for name, truth in (("k", K), ("Jxx", INERTIA[0, 0]), ("Jyy", INERTIA[1, 1])):
@@ -222,7 +210,7 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monk
 
     where = "windwrench.identification.vehicle_fit.held_out"
     monkeypatch.setattr(f"{where}.errors_at", errors)
-    logs = commanded[:2]
+    logs = commanded[:1]
     found = of_crazyflie(logs)
     check(found, "k", CRAZYFLIE.k[0], 0.05)
     status = parse_vehicle(dump_vehicle(found.vehicle)).status
@@ -275,6 +263,18 @@ def test_a_model_stands_on_each_flight():
         assert standing({OTHER_FLIGHTS: errors}) == stands
 
 
+def test_torques_that_fail_on_their_own_flight_turn_no_prediction(commanded, monkeypatch):
+    """12 times the error of no change, on flights of 9 s of which nothing can be held out."""
+
+    def errors(_, vehicles):
+        return [of(*4 * [2.0 if v.closed_loop is None else 1.0]) for v in vehicles]
+
+    monkeypatch.setattr("windwrench.identification.vehicle_fit.held_out.errors_at", errors)
+    found = of_crazyflie(commanded[:1], [(2.0, 9.0)])
+    assert found.vehicle.status.torque == "assumed"
+    assert "closed_loop damping" in found.estimates
+
+
 def test_a_vehicle_that_is_refuted_keeps_its_motion(commanded):
     log = commanded[0]
     status = ModelStatus("refuted", "refuted")
@@ -317,9 +317,8 @@ def test_an_inertia_that_no_body_has_moves_to_the_nearest(identified):
 @pytest.mark.parametrize(
     ("name", "line"),
     [
-        ("same_motor_four_times.csv.gz", "motors 1 and 2 are equal in every row"),
         ("ardupilot_rpm_tenth.bin", r"speeds in flight are 39, 39.5, 39.3, 39.3 rad/s; .* 100"),
-        ("px4_one_esc_low.ulg", "are 390, 395, 393, 70.7 rad/s; expected a ratio of at most 2"),
+        ("px4_one_esc_low.ulg", "are 390, 395, 393, 70.7 rad/s; expected a ratio of at most 1.5"),
     ],
 )
 def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):
@@ -328,12 +327,6 @@ def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):
         flight = read_log(log)
     with refused(line):
         identify([flight], 1.5, parse_geometry("0.17"))
-
-
-def test_rad_per_second_in_a_channel_of_rpm_are_read_right():
-    """PX4 in Gazebo: k came out 91 times too large, identified to .6 %."""
-    found = identify([read_log(data_file("hard_logs/px4_gz_rads_as_rpm.ulg"))], 0.465, GAZEBO)
-    check(found, "k", 8.05e-6, 0.02)
 
 
 def test_rotors_in_another_order_are_refused(inertial):
@@ -359,11 +352,10 @@ def test_turning_is_compared_with_torque_at_its_own_delay():
     t = period * np.arange(n)
     rate = period * np.cumsum(turn, axis=0)
     piece = MotionPiece(0, t, period, force, turn, rate, still, np.sqrt(square), None, None)
-    drive = Drive(GIVEN.positions, SPIN)
     sources = Sources("accelerometer", "gyro", "rotor speeds", True)
-    model, start, usual = first_model([piece], sources, drive, MASS, ("delay",))
+    model, start = first_model([piece], Model(MASS, GIVEN, sources), "delay")
     values = model.values(start)
-    assert usual.spin is SPIN
+    assert not model.opposite
     assert values["Jx"] == pytest.approx(INERTIA[0, 0], rel=0.2)
     assert values["Jy"] == pytest.approx(INERTIA[1, 1], rel=0.2)
 
@@ -389,14 +381,11 @@ def test_a_part_that_is_too_short_is_refused(inertial, window):
         identify([inertial[0][0]], MASS, GIVEN, [window])
 
 
-LAG = Estimate("motor_lag", 0.05, 0.04, 0.06, "s", IDENTIFIED, "")
-
-
-def found(*effects, curve=None, lag=LAG, commands=False):
+def found(*effects, curve=None):
     """Return as much of a result as exports read."""
     vehicle = replace(CRAZYFLIE.with_effects(*effects), motor_curve=curve)
-    fit = SimpleNamespace(drive=SimpleNamespace(commands=commands))
-    return SimpleNamespace(vehicle=vehicle, estimates={lag.name: lag}, fit=fit)
+    fit = SimpleNamespace(model=SimpleNamespace(commands=curve is not None))
+    return SimpleNamespace(vehicle=vehicle, estimates={}, fit=fit)
 
 
 def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
@@ -421,7 +410,7 @@ def test_px4_and_ardupilot_predict_the_drag_that_the_vehicle_has():
 def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
     full = 0.15
     bend = 0.7
-    it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)), commands=True)
+    it = found(curve=MotorCurve((0.0, (1 - bend) * full, bend * full)))
     text = EXPORTS["px4"](it)
     set_to = {k: float(x) for k, x in re.findall(r"param set (\S+) (\S+)", text)}
     assert set_to["THR_MDL_FAC"] == pytest.approx(bend, rel=1e-3)
@@ -429,20 +418,3 @@ def test_the_thrust_curve_hovers_where_the_autopilot_thinks():
     assert 4 * full * set_to["MPC_THR_HOVER"] == pytest.approx(it.vehicle.weight, rel=1e-3)
     assert "EKF2_MCOEF" not in set_to
     assert f"MOT_THST_EXPO,{bend:g}" in EXPORTS["ardupilot"](it)
-
-
-def test_rotorpy_makes_the_same_forces_and_torques():
-    it = found(EffectSetting("rotor_drag", {"kdx": 2e-6, "kdy": 3e-6}))
-    names = {"np": np}
-    exec(EXPORTS["rotorpy"](it), names)
-    p = names["quad_params"]
-    v = it.vehicle
-    speeds = np.array([1500.0, 1600.0, 1700.0, 1800.0])
-    thrust = v.k * speeds**2
-    place = np.array(list(p["rotor_pos"].values()))
-    torque = np.cross(place, np.column_stack([0 * thrust, 0 * thrust, thrust])).sum(axis=0)
-    torque[2] += p["k_m"] / p["k_eta"] * p["rotor_directions"] @ thrust
-    want = v.rotor_wrench(speeds)
-    assert [p["k_eta"] / v.k[0] * thrust.sum(), *torque] == pytest.approx(want, rel=1e-4)
-    assert p["tau_m"] == 0.05
-    assert p["k_d"] == pytest.approx(2.5e-6)
