@@ -19,7 +19,7 @@ FAST = tests/core tests/controllers tests/dynamics tests/estimator tests/identif
 
 CORE = $(shell find core live/export_c/source -name '*.[ch]pp')
 
-# all but the marked slow: some 15 minutes on two cores, and nearly all lines
+# all but the marked slow: some 5 minutes on two cores, and nearly all lines
 test: $(VENV)/.tested
 	$(PYTEST) -m "not slow"
 

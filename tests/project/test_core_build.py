@@ -93,6 +93,7 @@ def test_the_stub_says_what_the_core_says():
 
 
 @needs_compiler
+@pytest.mark.slow  # a build of its own: .ci/run asks for it by name
 @pytest.mark.skipif(sys.platform != "linux", reason="the sanitizers are loaded first, as on Linux")
 def test_the_core_s_tests_pass_under_sanitizers(tmp_path):
     """Built with the sanitizers of addresses and of undefined behaviour."""

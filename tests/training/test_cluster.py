@@ -74,6 +74,7 @@ def test_rllib_knows_the_environment_by_its_name(cluster):
     algorithm.stop()
 
 
+@pytest.mark.slow  # the workflow's job runs this file whole
 def test_a_task_that_dies_or_takes_too_long_costs_itself_alone(cluster):
     done = dict(each(work, [0, "exits", 1], cluster=cluster))
     assert (done.pop("exits").kind, done.keys()) == ("died", {0, 1})
