@@ -249,10 +249,10 @@ def test_errors_of_predictions_are_those_of_the_motion():
     (found,) = errors_of_models([log], [VEHICLE])
     assert found.model[1, -1] < 0.3 * velocity[-1]
     # by states of one's own, too, and not by lone rows of them
-    rest = np.tile(
-        [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], (len(log.t), 1)
-    )
-    lone = np.where((np.arange(len(log.t)) % 200 == 0)[:, None], rest, np.nan)
+    rest = np.zeros((len(log.t), 13))
+    rest[:, 2:4] = 1.0
+    lone = np.full_like(rest, np.nan)
+    lone[::200] = rest[0]
     shown, unknown = (predict(log, VEHICLE, 0.5, 200, x).velocity[5:, -1, 2] for x in (rest, lone))
     assert np.abs(shown).max() < 0.1 * fall
     assert np.abs(unknown).max() > 0.4 * fall
