@@ -76,7 +76,7 @@ def windwrench(
     Name physical effects that the vehicle's model lacks. Fly, rank and train controllers in
     simulated wind.
 
-    First step: windwrench demo flies, estimates, diagnoses and ranks, and writes one page.
+    First step: "windwrench demo" does all of this but training, and writes one page.
 
     Your own log: windwrench flight.ulg checks the log, estimates the wrench and names missing
     effects, on one page.

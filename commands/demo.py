@@ -22,8 +22,8 @@ def demo(
     no_open: bool = False,
     out: Path = Path("results/demo"),
 ) -> dict[str, Any]:
-    """Show the kit on one page, in a minute. Fly in wind, estimate the wrench, record a flight with
-    a hidden effect, diagnose the flight, and fly with the amended model.
+    """Try each step and write one page, in about a minute. Fly in wind, estimate the wrench,
+    record a flight with a hidden effect, diagnose the flight, and fly with the amended model.
 
     Example: windwrench demo --no-open
     """
