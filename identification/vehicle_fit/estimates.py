@@ -41,7 +41,8 @@ def estimates_of(fit: VehicleFit) -> Estimated:
     Raises:
         InputError: neither turning nor an arm says how large the vehicle is.
     """
-    said = {e.name: e for e in (*_thrust(fit), *_size(fit))}
+    thrust = (e._replace(of_force=True) for e in _thrust(fit))
+    said = {e.name: e for e in (*thrust, *_size(fit))}
     # m for each unit of the rotors' positions
     arm = UNIT if fit.model.geometry.known else said["arm_l"][1:4]
     further = (*_yaw(fit, said, arm), *_lag(fit), *_centre(fit, arm), *_air(fit, arm))
@@ -253,7 +254,8 @@ def _air(fit: VehicleFit, arm: Interval) -> Estimates:
         why = (fit.doubt if turns else "") or fit.kept[kind]
         for index, parameter in enumerate(effect.parameters, effect.first):
             known = _times(fit.interval(parameter, turns), size)
-            yield _of_effect(effect.role, index, known, hows[effect.shows], why)
+            estimate = _of_effect(effect.role, index, known, hows[effect.shows], why)
+            yield estimate._replace(of_force=not turns)
     if fit.hidden:
         value, deviation, least = (arm[0] * x for x in fit.hidden)
         wide = fit.width * deviation

@@ -186,7 +186,7 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
                 named[name] = named[name]._replace(status=REFUTED, how=WITHOUT_EFFECTS)
     if flown.status.force == REFUTED:
         for name, e in named.items():
-            if e.status == IDENTIFIED and name.startswith(("k", "thrust", "hover")):
+            if e.status == IDENTIFIED and e.of_force:
                 named[name] = e._replace(status=REFUTED, how=WITHOUT_FORCE)
     known = {e.name: e.status for e in named.values() if e.status != NOTHING}
     return replace(flown, status=replace(flown.status, coefficients=known))

@@ -26,7 +26,7 @@ from tests.identification.vehicle_fit.flown import (
 from tests.support.alike import assert_alike
 from tests.support.data_paths import data_file
 from tests.support.flown import recorded
-from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, vehicles
+from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, posed, vehicles
 from tests.support.outcomes import refused
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting, ModelStatus, MotorCurve
@@ -39,7 +39,7 @@ from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
-from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, standing
+from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, HeldOut, standing
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
@@ -226,6 +226,13 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monk
     assert any("roll movements" in line for line in found.advice)
     with refused(r"2 against 1 rad.*no arm is given; expected --geometry"):
         identify(logs, CRAZYFLIE.mass, parse_geometry(None))
+
+
+def test_a_refuted_force_takes_its_drag_along(monkeypatch):
+    where = "windwrench.identification.vehicle_fit.identify.held_out"
+    monkeypatch.setattr(where, lambda *_: HeldOut({}, "torque"))
+    found = identify(posed(), CRAZYFLIE.mass, parse_geometry(None)).estimates.values()
+    assert {e.name for e in found if e.status == "refuted"} == {"k", "body_drag dx", "body_drag dy"}
 
 
 def of(position, velocity, attitude, rate):
