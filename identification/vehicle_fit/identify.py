@@ -83,7 +83,14 @@ def identify(
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = checked_pieces(logs, windows)
-    notes = [f"warning: {log.name}: {text}" for log in logs for text in _doubts(log)]
+    kept = sorted({piece.log for piece in pieces})
+    pieces = [piece._replace(log=kept.index(piece.log)) for piece in pieces]
+    broken = "left out: no piece of 3 s in flight is unbroken in pose and sensors"
+    notes = []
+    for i, log in enumerate(logs):
+        doubts = _doubts(log) if i in kept else [broken]
+        notes += [f"warning: {log.name}: {text}" for text in doubts]
+    logs = [logs[i] for i in kept]
     basic = Model(
         mass, geometry, sources, voltage_ref=_voltage(pieces), speed_noise=speed_noise(pieces)
     )

@@ -25,7 +25,7 @@ from tests.identification.vehicle_fit.flown import (
 )
 from tests.support.alike import assert_alike
 from tests.support.data_paths import data_file
-from tests.support.flown import recorded
+from tests.support.flown import recorded, without_pose
 from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, posed, vehicles
 from tests.support.outcomes import refused
 from windwrench.dynamics import load_vehicle
@@ -101,6 +101,15 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(identified):
     assert list(found.predicted) == ["held_out_blocks", "flights_left_out"]
     for errors, _ in found.predicted.values():
         assert (errors.model[:, -1] < 0.3 * errors.still[:, -1]).all()
+
+
+def test_a_flight_whose_pose_is_in_pieces_is_left_out(commanded, identified):
+    first, last = commanded
+    broken = without_pose(replace(first, name="broken"), first.t % 2.0 < 0.2)
+    found = of_crazyflie([first, broken, last])
+    line = "warning: broken: left out: no piece of 3 s in flight is unbroken in pose and sensors"
+    assert found.notes == (*identified.notes, line)
+    assert str(found.estimates) == str(identified.estimates)  # with their NaN
 
 
 def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from():
