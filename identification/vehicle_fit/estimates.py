@@ -195,21 +195,21 @@ def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
 
 def _lag(fit: VehicleFit) -> Estimates:
     """Yield the rotors' lag, and the time offset of the motion."""
-    how = f"force and turning against {fit.model.sources.rotors}"
-    known, doubt = (
-        UNKNOWN,
-        (
-            "force follows the logged rotor speeds at once: they are measured, and no command is "
-            "logged beside them"
-        ),
-    )
+    name, how = effect_of(Role.LAG), f"force and turning against {fit.model.sources.rotors}"
     if "lag" in fit.model.free:
         if not fit.model.commands:
             how += ", which therefore are commanded, not measured"
-        known = fit.interval("lag")
-        late = "a time offset of the motion does nearly the same here"
-        doubt = "" if told(known) else late
-    yield _estimate(effect_of(Role.LAG), known, "s", how, doubt)
+        known, status = fit.interval("lag"), IDENTIFIED
+        if not told(known):  # the fit's time offset is right beside this lag alone
+            how = "a time offset of the motion does nearly the same here; the fit's value beside it"
+            status = ASSUMED
+        yield _estimate(name, known, "s", how, status=status)
+    else:
+        doubt = (
+            "force follows the logged rotor speeds at once: they are measured, and no command is "
+            "logged beside them"
+        )
+        yield _estimate(name, UNKNOWN, "s", how, doubt)
     offset = fit.interval("delay", False)
     yield _estimate("time_offset", offset, "s", "of the motion behind the rotors")
 

@@ -174,6 +174,18 @@ def test_an_imu_and_commands_are_enough():
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
 
 
+def test_a_lag_that_a_time_offset_may_be_is_assumed(inertial):
+    """The file held it without a doubt. Without any lag thrust would be early."""
+    log, _ = inertial[0]
+    noise = default_rng(0).standard_normal((2, *log.gyro.shape))
+    force, rate = log.accelerometer + 9.0 * noise[0], log.gyro + 0.3 * noise[1]
+    found = identify([replace(log, accelerometer=force, gyro=rate)], MASS, GIVEN)
+    again = parse_vehicle(dump_vehicle(found.vehicle))
+    assert [e.name for e in again.effects] == ["motor_lag"]
+    assert again.status.coefficients["motor_lag"] == found.estimates["motor_lag"].status
+    assert found.estimates["motor_lag"].status == "assumed"
+
+
 def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
     log, _ = inertial[0]
     volts = np.linspace(4.2, 3.5, len(log.t))
