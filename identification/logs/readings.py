@@ -237,15 +237,8 @@ def _weighed(readings: Sequence[Convention], world: str = "enu") -> list[Convent
     ]
 
 
-# with the spin mirrored, the rotors of body axes turned by 90 degrees: as unlikely as these
-_ASIDE = ((2, 3, 4, 1), (4, 1, 2, 3))
-ROTOR_READINGS = [  # other two departures at once are as unlikely as both
-    replace(
-        r,
-        unlikely=OTHER + 1.0
-        if r.mirrored and r.rotors in _ASIDE
-        else OTHER * (r.mirrored + (r.rotors != ROTORS)),
-    )
+ROTOR_READINGS = [  # two departures at once are as unlikely as both
+    replace(r, unlikely=OTHER * (r.mirrored + (r.rotors != ROTORS)))
     for r in _each(mirrored=(False, True), rotors=tuple(permutations(ROTORS)))[1:]
 ]
 
