@@ -49,6 +49,7 @@ def identify(
 
     Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
     """
+    from ..identification.motion.signals import known_pieces
     from ..identification.prediction import errors_of_models
     from ..identification.vehicle_fit.exports import EXPORTS
     from ..identification.vehicle_fit.geometry import parse_geometry
@@ -75,6 +76,8 @@ def identify(
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
     flights = read_logs([path for path, _ in parts], LogOptions(reader, map, piece))
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
+    for flight in unseen:
+        known_pieces(flight)  # refuses a flight that nothing can be compared with, before the fit
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
         identified = fit(flights, mass, where, windows[: len(logs)], out.stem, report=progress)

@@ -199,11 +199,13 @@ def _lag(fit: VehicleFit) -> Estimates:
     if "lag" in fit.model.free:
         if not fit.model.commands:
             how += ", which therefore are commanded, not measured"
-        known, status = fit.interval("lag"), IDENTIFIED
-        if not told(known):  # the fit's time offset is right beside this lag alone
-            how = "a time offset of the motion does nearly the same here; the fit's value beside it"
-            status = ASSUMED
-        yield _estimate(name, known, "s", how, status=status)
+        known = fit.interval("lag")
+        alike = "a time offset of the motion does nearly the same here"
+        # without the fit's value the thrust would come early
+        if doubt := fit.doubt or alike * (not told(known)):
+            yield _estimate(name, known, "s", f"{doubt}; the fit's value", status=ASSUMED)
+        else:
+            yield _estimate(name, known, "s", how)
     else:
         doubt = (
             "force follows the logged rotor speeds at once: they are measured, and no command is "

@@ -43,7 +43,7 @@ from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, HeldOu
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
-from windwrench.identification.vehicle_fit.report import explained, use_of
+from windwrench.identification.vehicle_fit.report import explained, headline, use_of
 from windwrench.identification.vehicle_fit.solve import nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
@@ -252,8 +252,10 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monk
 def test_a_refuted_force_takes_its_drag_along(monkeypatch):
     where = "windwrench.identification.vehicle_fit.identify.held_out"
     monkeypatch.setattr(where, lambda *_: HeldOut({}, "torque"))
-    found = identify(posed(), CRAZYFLIE.mass, parse_geometry(None)).estimates.values()
-    assert {e.name for e in found if e.status == "refuted"} == {"k", "body_drag dx", "body_drag dy"}
+    found = identify(posed(), CRAZYFLIE.mass, parse_geometry(None))
+    lost = {name for name, e in found.estimates.items() if e.status == "refuted"}
+    assert lost == {"k", "body_drag dx", "body_drag dy"}
+    assert "identified: nothing; assumed" in headline(found)
 
 
 def of(position, velocity, attitude, rate):
@@ -355,6 +357,11 @@ def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):
         flight = read_log(log)
     with refused(line):
         identify([flight], 1.5, parse_geometry("0.17"))
+
+
+def test_a_mass_in_grams_is_refused(inertial):
+    with refused("--mass 500 with rotors 0.12 m from the body axes"):
+        identify([inertial[0][0]], 1e3 * MASS, GIVEN)
 
 
 def test_rotors_in_another_order_are_refused(inertial):
