@@ -74,10 +74,15 @@ def identify(
     if not common[0] < common[1]:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
+    if len({*parts}) < len(parts):  # no fit may predict its own flight
+        twice, _ = max(parts, key=parts.count)
+        raise InputError(
+            f"{twice}: is given twice; expected each flight once, in the fit or in --test"
+        )
     flights = read_logs([path for path, _ in parts], LogOptions(reader, map, piece))
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
     for flight in unseen:
-        known_pieces(flight)  # refuses a flight that nothing can be compared with, before the fit
+        known_pieces(flight)  # refuses one without a pose before the fit
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
         identified = fit(flights, mass, where, windows[: len(logs)], out.stem, report=progress)

@@ -201,11 +201,10 @@ def _lag(fit: VehicleFit) -> Estimates:
             how += ", which therefore are commanded, not measured"
         known = fit.interval("lag")
         alike = "a time offset of the motion does nearly the same here"
+        doubt = fit.doubt or alike * (not told(known))
         # without the fit's value the thrust would come early
-        if doubt := fit.doubt or alike * (not told(known)):
-            yield _estimate(name, known, "s", f"{doubt}; the fit's value", status=ASSUMED)
-        else:
-            yield _estimate(name, known, "s", how)
+        status = ASSUMED if doubt else IDENTIFIED
+        yield _estimate(name, known, "s", doubt or how, status=status)
     else:
         doubt = (
             "force follows the logged rotor speeds at once: they are measured, and no command is "

@@ -186,12 +186,14 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
     gone = [effect for effect in vehicle.effects if effect not in flown.effects]
     lost = {e.name for e in gone} | {f"{e.name} {c}" for e in gone for c in e.coefficients}
     for name, e in named.items():
+        status, how = e.status, e.how
         if name in lost:
-            named[name] = e._replace(status=REFUTED, how=WITHOUT_EFFECTS)
-        elif e.status == IDENTIFIED and not tested.stands:
-            named[name] = e._replace(status=ASSUMED, how=f"{e.how}; nothing could be held out")
-        elif e.status == IDENTIFIED and e.of_force and flown.status.force == REFUTED:
-            named[name] = e._replace(status=REFUTED, how=WITHOUT_FORCE)
+            status, how = REFUTED, WITHOUT_EFFECTS
+        elif status == IDENTIFIED and not tested.stands:
+            status, how = ASSUMED, f"{how}; nothing could be held out"
+        elif status == IDENTIFIED and e.of_force and flown.status.force == REFUTED:
+            status, how = REFUTED, WITHOUT_FORCE
+        named[name] = e._replace(status=status, how=how)
     known = {e.name: e.status for e in named.values() if e.status != NOTHING}
     return replace(flown, status=replace(flown.status, coefficients=known))
 

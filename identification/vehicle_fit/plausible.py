@@ -20,17 +20,16 @@ def check_thrust(vehicle: Vehicle, measured: bool, log: str) -> None:
     Raises:
         InputError: no quadrotor has such a mass, or no propeller such a thrust coefficient.
     """
-    radius = vehicle.rotor_radius
-    loading = vehicle.weight / (4.0 * math.pi * radius**2)
-    low, high = _LOADINGS
+    disc = math.pi * vehicle.rotor_radius**2
+    loading, (low, high) = vehicle.weight / (4.0 * disc), _LOADINGS
     if not low <= loading <= high:
         raise InputError(
             f"--mass {vehicle.mass:g} with rotors {vehicle.arm_l:.3g} m from the body axes: "
             f"{loading:.3g} N on a square metre of their discs; expected {low:g} to {high:g}: "
             "the mass in kg, the distance in m"
         )
-    coefficient = vehicle.k[0] / (_AIR_DENSITY * math.pi * radius**4)
-    low, high = _THRUST_COEFFICIENTS
+    radius, (low, high) = vehicle.rotor_radius, _THRUST_COEFFICIENTS
+    coefficient = vehicle.k[0] / (_AIR_DENSITY * disc * radius**2)
     if not measured or low <= coefficient <= high:
         return
     usual = math.sqrt(coefficient / math.sqrt(low * high))
