@@ -67,8 +67,6 @@ def identify(
     out = result_file(out, "vehicle.yaml")
     if out.suffix not in (".yaml", ".yml"):
         raise InputError(f"--out {out}: expected a name that ends in .yaml")
-    if not (math.isfinite(mass) and 0.0 < mass < 1e4):
-        raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
     where = parse_geometry(geometry)
     common = (begin, math.inf if end is None else end)
     if not common[0] < common[1]:

@@ -131,9 +131,9 @@ def judged(
         )
         for e in named
     ]
-    for e in effects if fit.flights.thrust_std > 0.0 else ():
-        if get(e.name).role in THRUST_FACTORS:  # all of it may be the assumed thrust's error
-            names[e.name] = _apart(*e.coefficients.values(), *e.std.values())
+    for x in effects if "assumed thrust" in doubts else ():
+        if get(x.name).role in THRUST_FACTORS:  # all of it may be the assumed thrust's error
+            names[x.name] = _apart(*x.coefficients.values(), *x.std.values())
     if late := fit.given.late:
         names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
         effects.append(
