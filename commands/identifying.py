@@ -73,9 +73,9 @@ def identify(
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
     if len({*parts}) < len(parts):  # no fit may predict its own flight
-        twice, _ = max(parts, key=parts.count)
         raise InputError(
-            f"{twice}: is given twice; expected each flight once, in the fit or in --test"
+            f"{max(parts, key=parts.count)[0]}: is given twice; expected each flight once, in the "
+            "fit or in --test"
         )
     flights = read_logs([path for path, _ in parts], LogOptions(reader, map, piece))
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
@@ -86,15 +86,14 @@ def identify(
         identified = fit(flights, mass, where, windows[: len(logs)], out.stem, report=progress)
     if unseen:
         with working("predicting"):
-            parts_of = [[window] for window in windows[len(logs) :]]
             models = identified.vehicle, models_of(identified.vehicle)[SIMPLEST]
-            further = errors_of_models(unseen, models, windows=parts_of)
+            further = errors_of_models(unseen, models, 0.5, [[w] for w in windows[len(logs) :]])
         identified = identified._replace(predicted={**identified.predicted, "prediction": further})
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
     log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
-    seconds = identified.fit.balance.seconds
-    console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {headline(identified)}.")
+    sentence, seconds = headline(identified), identified.fit.balance.seconds
+    console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {sentence}.")
     show_table(
         ("quantity", "value", "± (95 %)", "unit", ""),
         [
@@ -118,7 +117,7 @@ def identify(
             table_of(vehicle, simplest),
         )
     console.print(use_of(identified))
-    result = {"headline": headline(identified), **identified_data(identified)}
+    result = {"headline": sentence, **identified_data(identified)}
     if export is not None:
         text = EXPORTS[export](identified)
         console.print(text, soft_wrap=True)

@@ -183,11 +183,10 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
                 shows = (stands, LOOP) if abs(value) > wide else (NOTHING, HIDDEN)
                 named[name] = Estimate(name, value, value - wide, value + wide, unit, *shows)
     flown = models.get(tested.stands, vehicle)
-    gone = [effect for effect in vehicle.effects if effect not in flown.effects]
-    lost = {e.name for e in gone} | {f"{e.name} {c}" for e in gone for c in e.coefficients}
+    gone = {effect.name for effect in vehicle.effects if effect not in flown.effects}
     for name, e in named.items():
         status, how = e.status, e.how
-        if name in lost:
+        if name.split()[0] in gone:
             status, how = REFUTED, WITHOUT_EFFECTS
         elif status == IDENTIFIED and not tested.stands:
             status, how = ASSUMED, f"{how}; nothing could be held out"
