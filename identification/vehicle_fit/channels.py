@@ -169,7 +169,7 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     if not pieces:
         raise InputError(
             f"{logs[0].name}: no piece of {_SHORTEST_PIECE:g} s in flight is unbroken "
-            "there; expected a longer flight, or another --from and --to"
+            "in pose and sensors; expected a longer flight, or another --from and --to"
         )
     return pieces, sources
 
@@ -191,7 +191,7 @@ def _felt(s: Signals) -> Array:
 
 def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
     """Yield motion by the pose's derivatives, with accelerometer and gyro in their place if any."""
-    for s in log_signals(log, wide_hz=np.inf):
+    for s in log_signals(log, wide_hz=np.inf) if pose_pieces(log) else ():
         force, velocity = _felt(s), in_body(s.velocity, s.rotation)
         rate, turning = s.angular_velocity, s.angular_acceleration
         if sources.force == "accelerometer" and log.accelerometer is not None:

@@ -52,6 +52,7 @@ _NO_OFFSET = 1e-6  # s, deviation of an absent time offset
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
 WITHOUT_FORCE = "an unchanged velocity predicts data outside the fit better than the force"
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
+HIDDEN = "the interval of the flight loop's reaction holds 0"
 LOOP = "predictions of half a second from states of the flight: no part of the vehicle"
 
 
@@ -83,7 +84,14 @@ def identify(
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = checked_pieces(logs, windows)
-    notes = [f"warning: {log.name}: {text}" for log in logs for text in _doubts(log)]
+    kept = sorted({piece.log for piece in pieces})
+    pieces = [piece._replace(log=kept.index(piece.log)) for piece in pieces]
+    broken = "left out: no piece of 3 s in flight is unbroken in pose and sensors"
+    notes = []
+    for i, log in enumerate(logs):
+        doubts = _doubts(log) if i in kept else [broken]
+        notes += [f"warning: {log.name}: {text}" for text in doubts]
+    logs = [logs[i] for i in kept]
     basic = Model(
         mass, geometry, sources, voltage_ref=_voltage(pieces), speed_noise=speed_noise(pieces)
     )
@@ -132,8 +140,7 @@ def identify(
     report(0.9, "predicting what is held out")
     tested = held_out(pieces, logs, fit, lambda part, why: described(part, why)[1])
     named, vehicle = described(fit, tested.why)
-    if not basic.commands:
-        check_thrust(named["k"].value, vehicle.rotor_radius, logs[0].name)
+    check_thrust(vehicle, not basic.commands, logs[0].name)
     _, excess = nearest_body(fit)
     if excess > _APART:
         notes.append(
@@ -173,21 +180,19 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
         ):
             name, wide = f"closed_loop {c}", 1.96 * size
             if size > 0.0:
-                shows = stands if abs(value) > wide else NOTHING
-                named[name] = Estimate(name, value, value - wide, value + wide, unit, shows, LOOP)
-    if not tested.stands:
-        for name, e in named.items():
-            if e.status == IDENTIFIED:
-                named[name] = e._replace(status=ASSUMED, how=f"{e.how}; nothing could be held out")
+                shows = (stands, LOOP) if abs(value) > wide else (NOTHING, HIDDEN)
+                named[name] = Estimate(name, value, value - wide, value + wide, unit, *shows)
     flown = models.get(tested.stands, vehicle)
-    for effect in vehicle.effects:
-        for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
-            if effect not in flown.effects and name in named:
-                named[name] = named[name]._replace(status=REFUTED, how=WITHOUT_EFFECTS)
-    if flown.status.force == REFUTED:
-        for name, e in named.items():
-            if e.status == IDENTIFIED and name.startswith(("k", "thrust", "hover")):
-                named[name] = e._replace(status=REFUTED, how=WITHOUT_FORCE)
+    gone = {effect.name for effect in vehicle.effects if effect not in flown.effects}
+    for name, e in named.items():
+        status, how = e.status, e.how
+        if name.split()[0] in gone:
+            status, how = REFUTED, WITHOUT_EFFECTS
+        elif status == IDENTIFIED and not tested.stands:
+            status, how = ASSUMED, f"{how}; nothing could be held out"
+        elif status == IDENTIFIED and e.of_force and flown.status.force == REFUTED:
+            status, how = REFUTED, WITHOUT_FORCE
+        named[name] = e._replace(status=status, how=how)
     known = {e.name: e.status for e in named.values() if e.status != NOTHING}
     return replace(flown, status=replace(flown.status, coefficients=known))
 
@@ -197,8 +202,10 @@ def _lag_alone(fit: VehicleFit) -> Estimate:
     start = np.where([name == "delay" for name in fit.model.free], 0.0, fit.theta)
     alone = fit.again(start, prior={**fit.model.prior, "delay": _NO_OFFSET})
     known = alone.interval("lag")
-    how = "of a model without a time offset: what other tools call the lag"
-    return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
+    status, how = IDENTIFIED, "of a model without a time offset: what other tools call the lag"
+    if not told(known):
+        status, how = NOTHING, "the interval is wider than half the value"
+    return Estimate("lag without offset", *known, "s", status, how)
 
 
 def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[Pieces, Sources]:

@@ -137,7 +137,7 @@ def refitted(fit: VehicleFit, fold: Index) -> list[tuple[Mask, VehicleFit]]:
     for held in np.unique(fold):
         keep = fold != held
         if not keep.any():
-            raise InputError("the flight is too short; expected more than 5 s without a break")
+            raise InputError("the flight is too short; expected 7.5 s in flight without a break")
         total = grams[keep].sum(axis=0)
         theta, information, _ = _moved(fit.balance, total, fit.model, fit.theta, _ROUNDS)
         part = replace(fit, theta=theta, information=information, scores=fit.scores[keep])

@@ -34,6 +34,7 @@ def test_a_factor_on_thrust_from_commands_alone_is_never_sure():
         assert other in effect.indistinguishable_from
         size = UNSTATED_THRUST_STD * (VEHICLE.mass if effect.name == "mass" else 1.0)
         assert all(std >= size for std in effect.std.values())
+        assert found.probabilities.names[effect.name] < 0.5  # of 5 beside 30 %
         assert any(
             note.startswith(f"{effect.name}: the log holds motor commands") for note in found.notes
         )

@@ -25,8 +25,8 @@ from tests.identification.vehicle_fit.flown import (
 )
 from tests.support.alike import assert_alike
 from tests.support.data_paths import data_file
-from tests.support.flown import recorded
-from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, vehicles
+from tests.support.flown import recorded, without_pose
+from tests.support.golden_identification import CRAZYFLIE, GOLDEN, made, posed, vehicles
 from tests.support.outcomes import refused
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting, ModelStatus, MotorCurve
@@ -39,11 +39,11 @@ from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
-from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, standing
+from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, HeldOut, standing
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
-from windwrench.identification.vehicle_fit.report import explained, use_of
+from windwrench.identification.vehicle_fit.report import explained, headline, use_of
 from windwrench.identification.vehicle_fit.solve import nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
@@ -101,6 +101,15 @@ def test_commanded_speeds_show_the_vehicle_and_its_lag(identified):
     assert list(found.predicted) == ["held_out_blocks", "flights_left_out"]
     for errors, _ in found.predicted.values():
         assert (errors.model[:, -1] < 0.3 * errors.still[:, -1]).all()
+
+
+def test_a_flight_whose_pose_is_in_pieces_is_left_out(commanded, identified):
+    first, last = commanded
+    broken = without_pose(replace(first, name="broken"), first.t % 2.0 < 0.2)
+    found = of_crazyflie([first, broken, last])
+    line = "warning: broken: left out: no piece of 3 s in flight is unbroken in pose and sensors"
+    assert found.notes == (*identified.notes, line)
+    assert str(found.estimates) == str(identified.estimates)  # with their NaN
 
 
 def test_a_vehicle_of_rounded_speeds_reads_the_log_that_it_comes_from():
@@ -165,6 +174,18 @@ def test_an_imu_and_commands_are_enough():
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
 
 
+def test_a_lag_that_a_time_offset_may_be_is_assumed(inertial):
+    """The file held it without a doubt. Without any lag thrust would be early."""
+    log, _ = inertial[0]
+    noise = default_rng(0).standard_normal((2, *log.gyro.shape))
+    force, rate = log.accelerometer + 9.0 * noise[0], log.gyro + 0.3 * noise[1]
+    found = identify([replace(log, accelerometer=force, gyro=rate)], MASS, GIVEN)
+    again = parse_vehicle(dump_vehicle(found.vehicle))
+    assert [e.name for e in again.effects] == ["motor_lag"]
+    assert again.status.coefficients["motor_lag"] == found.estimates["motor_lag"].status
+    assert found.estimates["motor_lag"].status == "assumed"
+
+
 def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
     log, _ = inertial[0]
     volts = np.linspace(4.2, 3.5, len(log.t))
@@ -226,6 +247,15 @@ def test_torque_that_loses_to_a_rate_that_stays_tells_no_inertia(commanded, monk
     assert any("roll movements" in line for line in found.advice)
     with refused(r"2 against 1 rad.*no arm is given; expected --geometry"):
         identify(logs, CRAZYFLIE.mass, parse_geometry(None))
+
+
+def test_a_refuted_force_takes_its_drag_along(monkeypatch):
+    where = "windwrench.identification.vehicle_fit.identify.held_out"
+    monkeypatch.setattr(where, lambda *_: HeldOut({}, "torque"))
+    found = identify(posed(), CRAZYFLIE.mass, parse_geometry(None))
+    lost = {name for name, e in found.estimates.items() if e.status == "refuted"}
+    assert lost == {"k", "body_drag dx", "body_drag dy"}
+    assert "identified: nothing; assumed" in headline(found)
 
 
 def of(position, velocity, attitude, rate):
@@ -327,6 +357,11 @@ def test_rotor_speeds_that_no_quadrotor_has_are_refused(name, line):
         flight = read_log(log)
     with refused(line):
         identify([flight], 1.5, parse_geometry("0.17"))
+
+
+def test_a_mass_in_grams_is_refused(inertial):
+    with refused("--mass 500 with rotors 0.12 m from the body axes"):
+        identify([inertial[0][0]], 1e3 * MASS, GIVEN)
 
 
 def test_rotors_in_another_order_are_refused(inertial):
