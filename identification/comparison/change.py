@@ -111,8 +111,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     """
     if not (after and before):
         raise InputError("compare: expected at least one flight in each of the two sets")
-    ways = difference(after, before)
-    unchanged = ways.variance
+    mean, unchanged, ways = difference(after, before)
     # a correction of the total by the voltage would hide a change: a heavier vehicle draws more and
     # pulls its battery down
     late, early = (np.log([trim.voltage for trim in group]).mean() for group in (after, before))
@@ -124,8 +123,8 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     for (place, kind), chance in _CHANGES.items():
         means, spread = _moved(place, kind, shares)
         variance = unchanged[:, None] + spread**2
-        off = np.square(ways.mean[:, None] - means) / variance + np.log(2.0 * np.pi * variance)
-        every = logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0) + prior
+        off = np.square(mean[:, None] - means) / variance + np.log(2.0 * np.pi * variance)
+        every = logsumexp(ways[:, None] - 0.5 * off.sum(axis=2), axis=0) + prior
         weights, amounts = softmax(every), _AMOUNTS * (place != NOWHERE)
         middle = amounts @ weights
         std = math.sqrt(np.square(amounts - middle) @ weights)
@@ -134,11 +133,11 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
     likeliest = max(places, key=places.__getitem__)
     kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
-    likely = np.exp(ways.log)
+    likely = np.exp(ways)
     return Change(
         before,
         after,
-        likely @ ways.mean,
+        likely @ mean,
         np.sqrt(likely @ unchanged),
         places,
         kinds.get("weaker", 0.0),

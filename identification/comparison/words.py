@@ -1,31 +1,21 @@
 """Changes between two sets of flights, and rotor faults within one: sentences, data, pictures."""
 
 from collections.abc import Sequence
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...runtime.drawing import (
-    AFTER,
-    BEFORE,
-    BLACK,
-    GREY,
-    PALE,
-    new_figure,
-    room_above,
-    styled,
-)
+from ...runtime.drawing import AFTER, BEFORE, BLACK, GREY, PALE, new_figure, room_above, styled
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
 from ..logs.table import Data, Values
 from ..logs.what_flew import PLACES
 from .change import NOWHERE, SOMETHING_ELSE, SURE, Change
-from .fault_detection import ALL, NOTHING, OTHER, RotorFault
+from .fault_channels import STEP
+from .fault_detection import ALL, NOTHING, OTHER, ROTORS, RotorFault
 from .trim import Trim
 
-_FOUND = {str(i): f"rotor {i}" for i in range(1, 5)}
 # sentences with a place for the probability
 _NO_ROTOR = {
     NOTHING: "No rotor lost thrust {}.",
@@ -34,70 +24,67 @@ _NO_ROTOR = {
     ALL: "All rotors lost thrust at once {}: the battery, the air, or the vehicle.",
 }
 _NAMED = 0.05  # least probability of a rival in the sentence
-_SAID = ("place", "sure", "weaker", "carries_more", "amount", "amount_std")
 
 
 def _undecided(chances: Values) -> str:
     """Return a sentence on an unsure finding and its rivals."""
-    likeliest = (
-        f"{name} {p:.2f}"
-        for name, p in sorted(chances.items(), key=itemgetter(1), reverse=True)
-        if p >= _NAMED
-    )
-    return f"Undecided, by probability: {', '.join(likeliest)}."
+    order = sorted(chances, key=chances.__getitem__, reverse=True)
+    named = [f"{name} {chances[name]:.2f}" for name in order if chances[name] >= _NAMED]
+    return f"Undecided, by probability: {', '.join(named)}."
 
 
 def change_headline(change: Change) -> str:
     """Return a sentence on the change, with its probability."""
-    place = change.place
-    chance = f"{change.places[place]:.2f}"
-    if not change.sure:
-        told = _undecided(change.places)
-        return told if place == NOWHERE else f"{told} If the first: {_kind(change)}"
+    place, chance = change.place, change.places[change.place]
     if place == NOWHERE:
-        return f"Nothing changed (probability {chance})."
-    return f"Changed: {place}, probability {chance}; {_kind(change)}"
-
-
-def _kind(change: Change) -> str:
+        sure = f"Nothing changed (probability {chance:.2f})."
+        return sure if change.sure else _undecided(change.places)
     size = f"{100 * change.amount:.0f} ± {100 * change.amount_std:.0f} %"
-    if change.place == SOMETHING_ELSE:
-        return "the rotors share the work otherwise than one weaker rotor or one weight would ask."
-    if change.place == "all rotors":
-        return (
+    if place == SOMETHING_ELSE:
+        kind = "the rotors share the work otherwise than one weaker rotor or one weight would ask."
+    elif place == "all rotors":
+        kind = (
             f"all rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
         )
-    if change.weaker >= SURE:
-        return f"that rotor delivers {size} less for what it is asked."
-    if change.carries_more >= SURE:
-        return f"the vehicle carries {size} of its weight more there."
-    return (
-        f"the rotor delivers {size} less (probability {change.weaker:.2f}), or the vehicle carries "
-        f"as much more there ({change.carries_more:.2f}): these look alike."
-    )
+    elif change.weaker >= SURE:
+        kind = f"that rotor delivers {size} less for what it is asked."
+    elif change.carries_more >= SURE:
+        kind = f"the vehicle carries {size} of its weight more there."
+    else:
+        kind = (
+            f"the rotor delivers {size} less (probability {change.weaker:.2f}), or the vehicle "
+            f"carries as much more there ({change.carries_more:.2f}): these look alike."
+        )
+    if not change.sure:
+        return f"{_undecided(change.places)} If the first: {kind}"
+    return f"Changed: {place}, probability {chance:.2f}; {kind}"
 
 
 def change_data(change: Change) -> Data:
     """Return the finding as plain data."""
 
     def flight(trim: Trim) -> Data:
+        total = trim.thrust.sum()
         return {
             "log": trim.name,
             "seconds": trim.seconds,
-            "thrust_share": trim.thrust / trim.thrust.sum(),
-            "total": trim.thrust.sum(),
+            "thrust_share": trim.thrust / total,
+            "total": total,
             "std": np.sqrt(trim.noise),
             "voltage": trim.voltage,
         }
 
     names = ("left_less_right", "front_less_rear", "diagonals", "log_total")
+    found = change._asdict()
     data: Data = plain(
-        {
+        found
+        | {
             "headline": change_headline(change),
-            "probabilities": change.places,
-            **{key: getattr(change, key) for key in _SAID},
+            "place": change.place,
+            "sure": change.sure,
+            "probabilities": found.pop("places"),
             "difference": dict(zip(names, change.difference, strict=True)),
-            "difference_std_if_unchanged": dict(zip(names, change.std, strict=True)),
+            "difference_std_if_unchanged": dict(zip(names, found.pop("std"), strict=True)),
             "before": [*map(flight, change.before)],
             "after": [*map(flight, change.after)],
         }
@@ -132,9 +119,9 @@ def _draw_change(change: Change) -> Any:
     ):
         # seen from above, front up: the vehicle's left is the picture's
         x, y = np.transpose([[-100.0, 100.0] * trim.features[:2] for trim in trims])
-        left.plot(x, y, "o", color=colour, label=label, ms=7, alpha=0.8)
-    left.axhline(0.0, color=PALE, lw=1)
-    left.axvline(0.0, color=PALE, lw=1)
+        left.plot(x, y, "o", color=colour, label=label, alpha=0.8)
+    left.axhline(0.0, color=PALE)
+    left.axvline(0.0, color=PALE)
     left.set(
         xlabel="left  -  thrust asked for, % of the total  -  right",
         ylabel="rear  -  % of the total  -  front",
@@ -142,9 +129,10 @@ def _draw_change(change: Change) -> Any:
     )
     left.legend()
     left.axis("equal")
-    names, chances = zip(*sorted(change.places.items(), key=itemgetter(1)), strict=True)
-    right.barh(names, chances, color=[AFTER if n == change.place else GREY for n in names])
-    right.axvline(SURE, color=BLACK, lw=1, ls="--")
+    names = sorted(change.places, key=change.places.__getitem__)
+    bars = right.barh(names, [change.places[name] for name in names], color=GREY)
+    bars[-1].set_color(AFTER)
+    right.axvline(SURE, color=BLACK, ls="--")
     right.set(
         xlim=(0.0, 1.0),
         xlabel="probability that something changed there",
@@ -153,58 +141,54 @@ def _draw_change(change: Change) -> Any:
     return figure
 
 
-def _place_of(fault: RotorFault, rotor: int) -> str:
-    """Return the number of a rotor (1 to 4), its place, and the log's own name if any."""
-    names = fault.samples.channels.motor_names
-    own = "" if names is None else f"; {names[rotor - 1]} in the log"
-    return f"{rotor} ({PLACES[rotor - 1]}{own})"
+def _named(fault: RotorFault, cause: str) -> str:
+    """Return a cause; a rotor's with its place, and the log's own name if any."""
+    if cause not in ROTORS:
+        return cause
+    names, i = fault.samples.motor_names, ROTORS.index(cause)
+    return f"{cause} ({PLACES[i]}{f'; {names[i]} in the log' if names else ''})"
 
 
 def fault_headline(fault: RotorFault) -> str:
     """Return a sentence on the rotor fault, its time and size, with its probability."""
-    likeliest = fault.likeliest
-    chance = fault.probabilities[likeliest]
-    sure = f"(probability {chance:.2f})" if chance < 0.9995 else "(probability above 0.999)"
+    found, chance = fault.found, fault.probabilities[fault.found]
     if not fault.sure:
-        return _undecided({_finding(fault, k): p for k, p in fault.probabilities.items()})
-    if likeliest in _NO_ROTOR:
-        return _NO_ROTOR[likeliest].format(sure)
+        return _undecided(
+            {
+                f"{'a fault of ' * (cause in ROTORS)}{_named(fault, cause)}": p
+                for cause, p in fault.probabilities.items()
+            }
+        )
+    sure = f"(probability {f'{chance:.2f}' if chance < 0.9995 else 'above 0.999'})"
+    if found in _NO_ROTOR:
+        return _NO_ROTOR[found].format(sure)
     when, low, high = fault.onset
     lost, most, least = (100 - 100 * share for share in fault.remaining)
     return (
-        f"Rotor {_place_of(fault, fault.rotor)} lost {lost:.0f} % of its thrust "
-        f"({least:.0f} to {most:.0f}) at t = {when:.3f} s ({low:.3f} to {high:.3f}, "
-        f"the log's clock) {sure}."
+        f"R{_named(fault, found)[1:]} lost {lost:.0f} % of its thrust ({least:.0f} to {most:.0f}) "
+        f"at t = {when:.3f} s ({low:.3f} to {high:.3f}, the log's clock) {sure}."
     )
-
-
-def _finding(fault: RotorFault, name: str) -> str:
-    return f"a fault of rotor {_place_of(fault, int(name))}" if name in _FOUND else name
 
 
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
-    channels = fault.samples.channels
-    onset, *onset_ci95 = fault.onset
-    remaining, *remaining_ci95 = fault.remaining
-    of_rotor = {
-        "rotor": fault.rotor,
-        "motor": channels.motor_names and channels.motor_names[fault.rotor - 1],
-        "onset_s": onset,
-        "onset_ci95_s": onset_ci95,
-        "remaining": remaining,
-        "remaining_ci95": remaining_ci95,
-    }
-    return {
-        "log": channels.name,
+    samples = fault.samples
+    data: Data = {
+        "log": samples.name,
         "headline": fault_headline(fault),
-        "found": _FOUND.get(fault.likeliest, fault.likeliest),
+        "found": fault.found,
         "sure": fault.sure,
-        "probabilities": {_FOUND.get(k, k): p for k, p in fault.probabilities.items()},
-        **(of_rotor if fault.likeliest in _FOUND else dict.fromkeys(of_rotor)),
-        "flight_s": fault.seconds,
-        "ended_because": fault.samples.ended or None,
+        "probabilities": fault.probabilities,
+        "flight_s": len(samples.t) * STEP,
+        "ended_because": samples.ended or None,
     }
+    of_rotor = ("rotor", "motor", "onset_s", "onset_ci95_s", "remaining", "remaining_ci95")
+    if fault.found not in ROTORS:
+        return data | dict.fromkeys(of_rotor)
+    i, names = ROTORS.index(fault.found), samples.motor_names
+    (onset, *when), (remaining, *share) = fault.onset, fault.remaining
+    values = (i + 1, names and names[i], onset, when, remaining, share)
+    return data | dict(zip(of_rotor, values, strict=True))
 
 
 def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:
@@ -220,22 +204,25 @@ def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path
 @styled()
 def _draw_faults(faults: Sequence[RotorFault]) -> Any:
     figure = new_figure(3.4 * len(faults))
-    axes = figure.subplots(len(faults), 2, squeeze=False)
-    for fault, (left, right) in zip(faults, axes, strict=True):
-        samples = fault.samples
-        channels = samples.channels
-        for panel, what, lines, kind, names in (
-            (left, "angular acceleration, rad/s2", samples.angular_acceleration, "about", "xyz"),
-            (right, "command", channels.command.at(samples.t), "rotor", "1234"),
+    panels = iter(figure.subplots(len(faults), 2, squeeze=False).flat)
+    for fault in faults:
+        t, found, samples = fault.samples.t, fault.found, fault.samples
+        chance = f"{_named(fault, found)}: {fault.probabilities[found]:.3f}"
+        for title, what, lines, names in (
+            (
+                Path(samples.name).name,
+                "angular acceleration, rad/s2",
+                samples.angular_acceleration,
+                ("about x", "about y", "about z"),
+            ),
+            (chance, "command, in parts of the median", samples.command.at(t), ROTORS),
         ):
-            panel.plot(samples.t, lines, lw=1, label=[f"{kind} {name}" for name in names])
+            panel = next(panels)
+            panel.plot(t, lines, lw=1, label=names)
             room_above(panel)
             panel.legend(loc="upper left", ncols=len(names))
-            panel.set(xlabel="t, s (the log's clock)", ylabel=what)
-            if fault.likeliest in _FOUND:
+            panel.set(xlabel="t, s (the log's clock)", ylabel=what, title=title)
+            if found in ROTORS:
                 panel.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
-                panel.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
-        left.set_title(Path(channels.name).name)
-        likeliest = fault.likeliest
-        right.set_title(f"{_finding(fault, likeliest)}: {fault.probabilities[likeliest]:.3f}")
+                panel.set_xlim(fault.onset[0] - 3.0, t[-1] + 0.1)
     return figure
