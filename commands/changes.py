@@ -67,7 +67,7 @@ def compare(
             part.count(session) for part in (sessions[: len(logs)], sessions[len(logs) :])
         )
         console.print(f"session {session}: {after} after, {before} before")
-    places = sorted(change.places.items(), key=lambda item: -item[1])
+    places = sorted(change.probabilities.items(), key=lambda item: -item[1])
     rows = [(name, f"{chance:.3f}") for name, chance in places]
     show_table(("where something changed", "probability"), rows)
     say(*written)

@@ -253,16 +253,18 @@ def _each_compared(trims: Mapping[str, Trim]) -> list[dict[str, Any]]:
 def _compared(name: str, change: Change) -> dict[str, Any]:
     """Return the answer of a comparison, beside the truth."""
     truth = truth_of(name)
-    if_changed = max((p for p in change.places if p != NOWHERE), key=change.places.__getitem__)
+    if_changed = max(
+        (p for p in change.probabilities if p != NOWHERE), key=change.probabilities.__getitem__
+    )
     return {
         "flight": name.removesuffix(".csv.gz"),
         "truth": truth,
         "place": change.place,
-        "probability": change.places[change.place],
+        "probability": change.probabilities[change.place],
         "if_changed": if_changed,
-        "changed": 1.0 - change.places[NOWHERE],
+        "changed": 1.0 - change.probabilities[NOWHERE],
         "sure": change.sure,
-        "difference": change.difference.tolist(),
+        "difference": [*change.difference.values()],
         "right": change.place == truth,
         "right_if_changed": truth == NOWHERE or if_changed == truth,
         "sure_and_wrong": change.sure and change.place != truth,

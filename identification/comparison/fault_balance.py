@@ -17,21 +17,25 @@ jumps in linear systems*, IEEE Transactions on Automatic Control 21, 1976).
 """
 
 import math
+from functools import partial
 from operator import itemgetter
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ...runtime.arrays import Array, Mask
-from .fault_channels import STEP, Samples
+from ..logs.table import Pair
+from .fault_channels import ORDER, STEP, Samples
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
 SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
 BEFORE, AFTER = 25, 4  # least intervals of usual flight before a fault, and after one
-PARTS = np.array([0.0, 0.25, 0.5, 0.75])  # starts of a fault within an interval
+# starts of a loss within an interval: at once (a propeller that breaks), or as the rotors' speed
+# falls (a motor)
+STARTS = np.tile([0.0, 0.25, 0.5, 0.75], 2)
 _AT_ONCE = 1e-9  # s, a lag
 _AROUND = 5  # intervals around a strong acceleration: the model may be as wrong there
-ORDER = 10
 SHARES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # activity over the quiet level, tried in turn
 _TURNING = 0.1  # activity per (rad/s)^2: the model's error while the vehicle turns
 _RIDGE = 1e-6  # keeps the filter tame where a residual is next to nothing
@@ -42,50 +46,49 @@ class FaultBalance:
     beside the likeliest jump.
 
     Attributes:
-        channels: the four.
+        curve: bend and dead zone of the rotors.
         thrust: relative thrusts (N, 4).
+        channels: the four.
         rows: possible starts of a jump.
-        ramps: elapsed shares (R, J) of a loss in its first intervals; 1 afterwards. A loss begins
-            at one of ``PARTS`` of an interval, at once (a propeller that breaks) or as the rotors'
-            speed falls (a motor).
+        ramps: elapsed shares (R, J) of a loss in its first intervals, by ``STARTS``; 1 afterwards.
         share: elapsed share (N,) of the likeliest jump.
         nothing, log: log-likelihoods of no jump, and of the likeliest.
     """
 
-    def __init__(self, samples: Samples, lag: float, bend: float, dead: float) -> None:
+    def __init__(self, samples: Samples, lag: float, curve: Pair) -> None:
         from scipy.ndimage import maximum_filter1d  # as late as can be: it takes .1 s
 
-        w, turning = samples.angular_velocity, samples.angular_acceleration
-        self.rows = slice(BEFORE, len(w) - AFTER)
+        w, turning = samples.angular_velocity.T, samples.angular_acceleration.T
+        count = w.shape[1]
+        self.curve = curve
+        self.rows = slice(BEFORE, count - AFTER)
         self.ramps = _ramps(lag)
-        self.thrust = thrust = samples.thrust(lag, bend, dead)
-        gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, 1, axis=1)
-        free = [[np.ones(len(w)), *own] for own in zip(w.T, gyroscopic.T, strict=True)]
+        self.thrust = thrust = samples.thrust(lag, *curve)
+        # free columns: a bias, damping and the gyroscopic moment
+        free = [[np.ones(count), w[i], w[i - 2] * w[i - 1]] for i in range(3)]
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
-        free[2].extend(turning.T[:2])
+        free[2].extend(turning[:2])
         # each channel's moment, free columns and measurement
-        parts = zip(SIGNS, [*free, []], [*turning.T, samples.specific_force], strict=True)
-        columns = [np.column_stack([thrust @ signs, *own, y]) for signs, own, y in parts]
+        parts = zip(SIGNS, [*free, []], [*turning, samples.specific_force], strict=True)
+        columns = [np.array([thrust @ signs, *own, y]) for signs, own, y in parts]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
-        away += _TURNING * np.square(w).sum(axis=1) + samples.between
+        away += _TURNING * np.square(w).sum(axis=0) + samples.between
         # at the start of a fault the error of its shape grows with the acceleration
-        strong = maximum_filter1d(np.linalg.norm(turning[:, :2], axis=1), _AROUND)
+        strong = maximum_filter1d(np.linalg.norm(turning[:2], axis=0), _AROUND)
         away += strong / max(strong.max(), 1e-300)
         activity = maximum_filter1d(away, 2)  # a rotor late by an interval is wrong there too
-        whole = np.convolve(samples.follows, np.ones(ORDER))[: len(w)] == ORDER
-        whole[:ORDER] = False
         step: list[Array] = []  # none, and then the likeliest jump beside the noise
         nothing: list[float] = []
         for _ in range(3):
-            self.channels = [BalanceChannel(x, activity, whole, *step) for x in columns]
+            self.channels = [BalanceChannel(x, activity, samples.whole, *step) for x in columns]
             nothing.append(sum(channel.nothing for channel in self.channels))
             k = BEFORE + int(np.argmax(self.steps(self.rows, self.ramps[:1])))
             begin = max(k - 2, BEFORE)
             logs = self.steps(slice(begin, min(k + 3, self.rows.stop)), self.ramps)
             self.log = logs.max()
             ramp, more = np.unravel_index(np.argmax(logs), logs.shape)
-            share = np.concatenate([np.zeros(begin + more), self.ramps[ramp], np.ones(len(w))])
-            self.share = share[: len(w)]
+            share = np.concatenate([np.zeros(begin + more), self.ramps[ramp], np.ones(count)])
+            self.share = share[:count]
             step = [self.share]
         self.nothing = max(nothing[0], nothing[-1])
 
@@ -93,15 +96,11 @@ class FaultBalance:
         """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
         return np.array([sum(c.steps(rows, ramp) for c in self.channels) for ramp in ramps])
 
-    def sizes(self, jump: Array) -> Array:
-        """Return the sizes of a jump (N, 4) in the channels, and their standard deviations."""
-        return np.transpose([*map(BalanceChannel.part, self.channels, jump.T)])
-
 
 def _ramps(lag: float) -> Array:
     """Return the elapsed shares of a loss; see ``FaultBalance``."""
-    lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], len(PARTS))[:, None]
-    elapsed = np.arange(2 + math.ceil(4.0 * lag / STEP)) - np.tile(PARTS, 2)[:, None]
+    lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], len(STARTS) // 2)[:, None]
+    elapsed = np.arange(2 + math.ceil(4.0 * lag / STEP)) - STARTS[:, None]
     since = STEP * np.maximum(elapsed, 0.0)
     # integral of 1 - exp(-since / lag)
     return np.asarray(np.diff(since + lags * np.expm1(-since / lags)) / STEP)
@@ -111,55 +110,53 @@ class BalanceChannel:
     """A channel's moment, free columns and measurement as innovations of the noise.
 
     Args:
-        columns: (N, c) these, in this order.
+        columns: (c, N) these, in this order.
         activity: (N,) relative deviation of the rotors from the mean.
         whole: (N,) the ``ORDER`` samples before are there, without a gap.
         step: further columns (N,) in the fit of the noise.
     """
 
     def __init__(self, columns: Array, activity: Array, whole: Mask, *step: Array) -> None:
-        x, y = np.column_stack([columns[:, :-1], *step]), columns[:, -1]
-        residual = y - x @ (beta := np.linalg.lstsq(x, y, rcond=None)[0])
+        from scipy.signal import lfilter  # as late as can be: it takes .6 s
+
+        y, x = columns[-1], np.vstack([columns[:-1], *step])
+        residual = y - (beta := np.linalg.lstsq(x.T, y, rcond=None)[0]) @ x
         if beta[0] <= 0.0:  # a moment with a negative factor is left out
-            residual = y - x[:, 1:] @ np.linalg.lstsq(x[:, 1:], y, rcond=None)[0]
+            residual = y - np.linalg.lstsq(x[1:].T, y, rcond=None)[0] @ x[1:]
         weights = 1.0 / np.hypot(1.0, np.outer(SHARES, activity))
         fits = [_fit_noise(residual, weight, whole) for weight in weights]
-        _, self.variance, self.filter, self.weight = max(fits, key=itemgetter(0))
-        self.whole = whole
-        self.white = self._filtered((columns.T * self.weight).T)[whole]
-        directions, r = np.linalg.qr(self.white)
+        _, self.variance, whitener, self.weight = max(fits, key=itemgetter(0))
+        self.filtered, self.whole = partial(lfilter, whitener, 1.0), whole
+        self.white = self._innovations(columns)
+        directions, r = np.linalg.qr(self.white.T)
         # the last one is what no column explains of the measurement
         directions[:, -1] *= r[-1, -1]
         self.rest = r[-1, -1] ** 2
-        self.nothing = float(_log_likelihood(self.rest, self.weight[whole]))
-        # products of an impulse in each row with all directions: the filter runs backwards
-        against = np.zeros_like(columns)
-        against[whole] = directions
-        impulses = self._filtered(against[::-1])[::-1].T * self.weight
-        # a step is a row of impulses; and the sum of its squares, had it begun long before
-        steps = impulses[:, ::-1].cumsum(axis=1)[:, ::-1]
-        squares = np.square(whole * self._filtered(self.weight))[::-1].cumsum()[::-1]
-        self.from_row_on = np.vstack([steps, squares, self.weight, whole])
+        self.nothing = _log_likelihood(self.rest, self.weight[whole])
+        # products of an impulse in each row with all directions: the filter runs backwards. A step
+        # is a row of impulses; and the sum of its squares, had it begun long before
+        products = self.filtered(directions.T[:, ::-1]) * self.weight[::-1]
+        squares = np.square(self._innovations(np.ones(len(whole))))[::-1]
+        sums = np.vstack([products, squares]).cumsum(axis=1)[:, ::-1]
+        self.from_row_on = np.vstack([sums, self.weight, whole])
 
-    def _filtered(self, values: Array) -> Array:
-        """Return the noise filter's output (N, ...); others than ``whole`` mean nothing."""
-        from scipy.signal import lfilter  # as late as can be: it takes .6 s
-
-        return np.asarray(lfilter(self.filter, 1.0, values, axis=0))
+    def _innovations(self, values: Array) -> Array:
+        """Return the innovations (..., N) of values; zero outside ``whole``."""
+        return np.asarray(self.filtered(values * self.weight) * self.whole)
 
     def part(self, column: Array) -> tuple[float, float]:
         """Return the ratio, negative, of the factors of a column (N,) and of the moment, and its
         standard deviation: infinite where the channel does not follow the commands.
         """
-        shape = self._filtered(column * self.weight)[self.whole]
-        x, y = np.column_stack([shape, self.white[:, :-1]]), self.white[:, -1]
+        x, y = np.vstack([self._innovations(column), self.white[:-1]]), self.white[-1]
         inverse = np.linalg.pinv(x)
-        factor, moment = (beta := inverse @ y)[:2].tolist()
-        noise = np.linalg.norm(y - x @ beta) / math.sqrt(len(y) - len(beta))
-        if moment <= 2.0 * noise * np.linalg.norm(inverse[1]):
+        factor, moment = (beta := y @ inverse)[:2].tolist()
+        noise = np.linalg.norm(y - beta @ x) / math.sqrt(self.whole.sum() - len(beta))
+        if moment <= 2.0 * noise * np.linalg.norm(inverse[:, 1]):
             return 0.0, math.inf
         ratio = factor / moment
-        return -ratio, float(noise * np.linalg.norm(inverse[0] - ratio * inverse[1]) / moment)
+        spread = np.linalg.norm(inverse[:, 0] - ratio * inverse[:, 1])
+        return -ratio, float(noise * spread / moment)
 
     def steps(self, rows: slice, ramp: Array) -> Array:
         """Return the log-likelihoods (K,) of a step beginning at each of ``rows`` by a ramp.
@@ -171,18 +168,18 @@ class BalanceChannel:
         begun = np.append(ramp, np.ones(ORDER + 1))
         padded = np.pad(self.from_row_on, [(0, 0), (0, len(begun))])
         windows = sliding_window_view(padded, len(begun), axis=1)[:, rows]
-        *steps, squares, weight, whole = windows
-        sums = np.array(steps) @ np.diff(begun, prepend=0.0)
-        outputs = whole * self._filtered((begun * weight).T).T
+        *products, squares, weight, whole = windows
+        *known, own = np.array(products) @ np.diff(begun, prepend=0.0)
+        outputs = whole * self.filtered(begun * weight)
         square = np.square(outputs[:, :-1]).sum(axis=1) + squares[:, -1]
-        own = square - np.square(sums[:-1]).sum(axis=0)
-        gain = np.square(sums[-1]) / np.maximum(own, 1e-12 * square + 1e-300)
+        left = square - np.square(known).sum(axis=0)
+        gain = np.square(own) / np.maximum(left, 1e-12 * square + 1e-300)
         width = 1.0 + np.log(np.maximum(gain / self.variance, 1.0))
         price = 0.5 * np.maximum(width, math.log(self.whole.sum()))
         return np.asarray(_log_likelihood(self.rest - gain, self.weight[self.whole]) - price)
 
 
-def _fit_noise(residual: Array, weight: Array, whole: Mask) -> tuple[float, float, Array, Array]:
+def _fit_noise(residual: Array, weight: Array, whole: Mask) -> tuple[Any, float, Array, Array]:
     """Fit an autoregression to a residual (N,) with weights (N,).
 
     Returns:
@@ -194,12 +191,12 @@ def _fit_noise(residual: Array, weight: Array, whole: Mask) -> tuple[float, floa
     ridge = _RIDGE * gram[0, 0] * np.eye(ORDER)
     poles = np.linalg.solve(gram[1:, 1:] + ridge, gram[1:, 0])
     rest = np.square(windows @ (whitener := np.append(1.0, -poles))).sum()
-    return float(_log_likelihood(rest, weight[whole])), rest / len(windows), whitener, weight
+    return _log_likelihood(rest, weight[whole]), rest / len(windows), whitener, weight
 
 
-def _log_likelihood(rest: Array | float, weight: Array) -> Array:
+def _log_likelihood(rest: Any, weight: Array) -> Any:
     """Return the log-likelihood of innovations of ``weight`` (n,) with ``rest`` as the sum of
     squares, at the best variance.
     """
     n = len(weight)
-    return np.asarray(np.log(weight).sum() - 0.5 * n * np.log(np.maximum(rest, 1e-300) / n))
+    return np.log(weight).sum() - 0.5 * n * np.log(np.maximum(rest, 1e-300) / n)

@@ -19,14 +19,15 @@ from ..logs.flight_phases import usual_thrust
 from ..logs.readers import px4_ulog
 from ..logs.reading import READERS, reader_by_content
 from ..logs.table import Data, Names, median_step
-from ..motion.smoothing import lagged, runs_of
+from ..motion.smoothing import lagged
 
+ORDER = 10  # of the noise's autoregression
 STEP = 0.02  # s, grid: a rotor takes about as long to follow
 FINE = 0.004  # s, grid of commands for the rotors' lag
 SETTLED = 1.5  # s after the rotors first carry the vehicle, until it is off the ground
 LEAST_SECONDS = 3.0  # in flight: a shorter one does not show the usual motion
 LONGEST_GAP = 0.1  # s without a sample; nothing is interpolated across a longer gap
-SHORTEST = 0.2  # s of unbroken samples; the noise of a shorter run has no past
+SHORTEST = ORDER + 1  # unbroken intervals; the noise of a shorter run has no past
 # an axis is clipped if it stays this long within this share of its magnitude, near the end of a
 # usual range of gyros (moved a little by a calibration) or at the largest value of the log
 CLIPPED_SECONDS, CLIPPED_SHARE = 0.04, 0.01
@@ -45,15 +46,15 @@ class Samples(NamedTuple):
     angular_acceleration: Array  # (N, 3) rad/s2, means
     angular_velocity: Array  # (N, 3) rad/s, means
     specific_force: Array  # (N,) m/s2 along body z, means
-    follows: Mask  # (N,) the interval before is there too
+    whole: Mask  # (N,) the ``ORDER`` intervals before are there, without a gap
     command: Stream  # (K, 4) in parts of the median while flying, each ``FINE``
     # (N,) possible error of the command between its own samples, in parts of the median: half of
     # the change from one to the next in the middle, nothing at either
     between: Array
     # the command is thrust itself but for a factor (rotor speeds squared): no curve is looked for
     thrust_known: bool
-    motor_names: Names | None  # the log's own, of rotors 1 to 4
-    ended: str  # reason for the end of the search; empty: the log's end
+    motor_names: Names  # the log's own, of rotors 1 to 4; or none
+    ended: str | None  # reason for the end of the search; None: the log's end
 
     def thrust(self, lag: float, bend: float, dead: float) -> Array:
         """Return the rotors' relative thrusts (N, 4): 1 at the median command while flying.
@@ -76,24 +77,23 @@ def samples_of(log: FlightLog, path: Path | None = None) -> Samples:
 
     Args:
         log: the log.
-        path: its file: a PX4 file has the channels' own rates and clock.
+        path: its file: a PX4 file has the channels' own rates and clock, and names of the motors.
 
     Raises:
         InputError: one of the three is missing, or less than 3 s of flight.
     """
-    name, command, motors = log.source or log.name, log.command, None
-    if path is not None and reader_by_content(path) is READERS["px4_ulog"]:
+    name, command = log.source or log.name, log.command
+    motors: Names = ()
+    if path and reader_by_content(path) is READERS["px4_ulog"]:
         (log_map, streams, *_), _ = px4_ulog.channels(path, has_ranges=False)
-        name, known = str(path), False
-        if log_map.commands is not None:
+        if log_map.commands:
             motors = tuple(f"PX4 motor {i}" for i in log_map.commands.order)
     else:
-        if known := command is None:
-            command = np.square(log.rotor_speeds)
+        values = np.square(log.rotor_speeds) if command is None else command
         # a held command changes at its own samples alone
-        new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
+        new = np.any(np.diff(values, axis=0, prepend=np.nan) != 0.0, axis=1)
         new[-1] = True
-        streams = {"commands": Stream("commands", log.t[new], command[new])}
+        streams = {"commands": Stream("commands", log.t[new], values[new])}
         for part in ("gyro", "accelerometer"):
             if (values := getattr(log, part)) is not None:
                 streams[part] = Stream(part, log.t, values)
@@ -104,7 +104,7 @@ def samples_of(log: FlightLog, path: Path | None = None) -> Samples:
             f"{name}: no {' and no '.join(missing)}; expected all of gyro, accelerometer and "
             "motor commands, to look for a rotor that lost thrust"
         )
-    return sample(name, **found, thrust_known=known, motor_names=motors)
+    return sample(name, **found, thrust_known=command is None, motor_names=motors)
 
 
 def sample(
@@ -113,13 +113,15 @@ def sample(
     accelerometer: Stream,
     commands: Stream,
     thrust_known: bool = False,
-    motor_names: Names | None = None,
+    motor_names: Names = (),
 ) -> Samples:
     """Put streams on the grid.
 
     Raises:
         InputError: less than 3 s of flight.
     """
+    from scipy.ndimage import binary_opening  # as late as can be: it takes .1 s
+
     times = gyro.t, accelerometer.t, commands.t
     edges = np.arange(max(at[0] for at in times), min(at[-1] for at in times), STEP)
     t = 0.5 * (edges[1:] + edges[:-1])
@@ -130,8 +132,7 @@ def sample(
     begin = t[keep].min(initial=np.inf) + SETTLED
     stop, ended = _end(gyro, accelerometer, begin)
     keep &= (t > begin) & (t < stop)
-    for a, b in runs_of(keep):
-        keep[a:b] = (b - a) * STEP > SHORTEST
+    keep = binary_opening(keep, np.ones(SHORTEST))
     if (seconds := keep.sum() * STEP) < LEAST_SECONDS:
         raise InputError(
             f"{name}: {seconds:.3g} s in flight with gyro, accelerometer and commands; expected "
@@ -149,12 +150,12 @@ def sample(
         np.diff(rate, axis=0)[keep] / STEP,
         0.5 * (rate[1:] + rate[:-1])[keep],
         _means(accelerometer, t)[:, 2],
-        np.append(False, keep[:-1])[keep],
+        (np.convolve(keep, np.ones(ORDER + 1))[: len(keep)] > ORDER)[keep],
         Stream("command", fine, commands.at(fine) / usual),
         np.sqrt(off).mean(axis=1) * is_slow / usual,
         thrust_known,
         motor_names,
-        ended,
+        ended or None,
     )
 
 
@@ -179,7 +180,7 @@ def _end(gyro: Stream, accelerometer: Stream, begin: float) -> tuple[float, str]
     spread = maximum_filter1d(rate, count, axis=0) - minimum_filter1d(rate, count, axis=0)
     clipped = np.any(at_limit & (spread < CLIPPED_SHARE * size), axis=1)
     # the filters look half their width to either side
-    ends = gyro.t[np.maximum(np.flatnonzero(clipped) - count // 2, 0)]
+    ends = gyro.t[: -(count // 2)][clipped[count // 2 :]]
     force = np.linalg.norm(accelerometer.values, axis=1)
     hits = accelerometer.t[(force > IMPACT) & (accelerometer.t > begin)] - STEP
     return min(

@@ -12,19 +12,20 @@ quadrotor with one rotor in each quadrant. Two questions are asked apart:
 """
 
 import math
-from typing import NamedTuple
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
 
 from ...runtime.arrays import Array
 from ..logs.table import ArrayPair
-from .fault_balance import PARTS, SIGNS, FaultBalance
+from .change import SURE
+from .fault_balance import SIGNS, STARTS, FaultBalance
 from .fault_channels import STEP, Samples
 
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
 ROTORS = ("rotor 1", "rotor 2", "rotor 3", "rotor 4")
-Interval = tuple[float, float, float]  # middle, low and high
 
 _LOSSES = np.linspace(0.05, 1.0, 39)  # tried shares of a rotor's thrust
 _ALL_LOSE = 0.5  # the largest share tried for all rotors together
@@ -41,36 +42,34 @@ _ERROR = 0.25
 # standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
 # usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
-_SURE = 0.95  # least probability of a fault named without a doubt
 
 
 class RotorFault(NamedTuple):
-    """The result of a search in one flight."""
+    """The result of a search in one flight; of no rotor, the last six are None."""
 
     samples: Samples
+    log: str  # its name
+    flight_s: float
+    ended_because: str | None  # reason for the end of the search; None: the log's end
     probabilities: dict[str, float]  # of nothing, each rotor, all rotors, and another cause; sum: 1
-    # the likeliest rotor's; onset as median, thrust as mean, each with a 95 % interval
-    onset: Interval  # s, on the log's clock
-    remaining: Interval  # remaining share of thrust
-
-    @property
-    def found(self) -> str:
-        """The likeliest of ``probabilities``."""
-        return max(self.probabilities, key=self.probabilities.__getitem__)
-
-    @property
-    def sure(self) -> bool:
-        """Whether the likeliest is sure."""
-        return self.probabilities[self.found] >= _SURE
+    found: str  # the likeliest
+    sure: bool  # whether it is sure
+    rotor: int | None = None  # 1 to 4
+    motor: str | None = None  # the log's own name
+    # onset as median, share of thrust as mean, each with a 95 % interval
+    onset_s: Any = None  # on the log's clock
+    onset_ci95_s: Any = None
+    remaining: Any = None
+    remaining_ci95: Any = None
 
 
 def find_fault(samples: Samples) -> RotorFault:
     """Look for a rotor that lost thrust during a flight."""
     curves = _CURVES[:1] if samples.thrust_known else _CURVES
-    bent = [FaultBalance(samples, _USUAL_LAG, *curve) for curve in curves]
-    curve = curves[int(np.argmax([one.log for one in bent]))]
-    tried = [*bent, *(FaultBalance(samples, lag, *curve) for lag in _LAGS)]
-    best = max(tried, key=lambda one: one.log)
+    tried = [FaultBalance(samples, _USUAL_LAG, curve) for curve in curves]
+    curve = max(tried, key=attrgetter("log")).curve
+    tried += [FaultBalance(samples, lag, curve) for lag in _LAGS]
+    best = max(tried, key=attrgetter("log"))
     jumps = best.steps(best.rows, best.ramps)
     each, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
@@ -78,14 +77,31 @@ def find_fault(samples: Samples) -> RotorFault:
     event = logsumexp(jumps) + math.log(sum(_EVENTS) / (len(jumps) * len(samples.t)))
     nothing = math.log(_NOTHING) + max(one.nothing for one in tried)
     chances = softmax(np.append(nothing, event + log_softmax(logs)))
-    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), samples.t[best.rows])
-    lost = weights[np.argmax(logs[:4])]
-    _, least, most = _interval(_LOSSES, lost, 0.5 * (_LOSSES[1] - _LOSSES[0]))
-    return RotorFault(
+    causes = dict(zip([NOTHING, *ROTORS, ALL, OTHER], chances.tolist(), strict=True))
+    found = max(causes, key=causes.__getitem__)
+    fault = RotorFault(
         samples,
-        dict(zip([NOTHING, *ROTORS, ALL, OTHER], chances.tolist(), strict=True)),
-        _interval(starts.ravel(), softmax(jumps).ravel(), STEP),
-        (1.0 - lost @ _LOSSES, max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
+        samples.name,
+        len(samples.t) * STEP,
+        samples.ended,
+        causes,
+        found,
+        causes[found] >= SURE,
+    )
+    if found not in ROTORS:
+        return fault
+    i = ROTORS.index(found)
+    starts = np.add.outer(STEP * (STARTS - 0.5), samples.t[best.rows])
+    onset, begin, end = _interval(starts.ravel(), softmax(jumps).ravel(), STEP)
+    margin = 0.5 * (_LOSSES[1] - _LOSSES[0])
+    _, least, most = _interval(1.0 - _LOSSES, weights[i], margin)
+    return fault._replace(
+        rotor=i + 1,
+        motor=samples.motor_names[i] if samples.motor_names else None,
+        onset_s=onset,
+        onset_ci95_s=(begin, end),
+        remaining=1.0 - weights[i] @ _LOSSES,
+        remaining_ci95=(max(0.0, least), min(1.0, most)),
     )
 
 
@@ -103,7 +119,10 @@ def _patterns(best: FaultBalance) -> ArrayPair:
         (jump, few * [0.0, 0.0, 0.0, 4.0], _ERROR * few * [2.0, 2.0, 2.0, 4.0]),
         (jump, np.zeros((1, 1)), np.array(_OTHER)),
     ]
-    sizes = [best.sizes(shape) for shape, *_ in causes]
+    sizes = [
+        np.transpose([c.part(x) for c, x in zip(best.channels, shape.T, strict=True)])
+        for shape, *_ in causes
+    ]
     # channels finite under every hypothesis, so all hypotheses explain the same numbers
     says = np.isfinite(sizes).all(axis=(0, 1))
     logs = []
@@ -115,7 +134,7 @@ def _patterns(best: FaultBalance) -> ArrayPair:
     return np.array(evidence), softmax(logs[:4], axis=1)
 
 
-def _interval(values: Array, weight: Array, margin: float) -> Interval:
+def _interval(values: Array, weight: Array, margin: float) -> tuple[float, float, float]:
     """Return the median and the ends of a 95 % interval, widened by a step of the grid."""
     order = np.argsort(values, kind="stable")
     at = np.searchsorted(np.cumsum(weight[order]), (0.5, 0.025, 0.975))

@@ -50,7 +50,7 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> tuple[Array, Ar
     flights = [*before, *after]
     later = np.arange(len(flights)) >= len(before)
     x = np.array([trim.features for trim in flights])
-    noise = np.array([trim.noise for trim in flights])
+    noise = np.square([trim.std for trim in flights])
     scales = np.exp(2.0 * _SPREAD * _SCALES.T[..., None])
     session, flight = scales * np.square([[SESSION_STD], [FLIGHT_STD]])  # (k, 4) variances
     own = (flight[..., None] + noise.T)[..., None] * np.eye(len(x))  # (k, 4, n, n)

@@ -31,6 +31,7 @@ EDGE = 1.5  # s after the rotors start and before they stop: taking off and land
 NEAR = 0.1  # of the median thrust: further off, the vehicle climbs, sinks or pulls
 _SMOOTH = 0.25  # s
 BATCH = 1.5  # s: the loop's answer to a gust is over
+FEATURES = ("left_less_right", "front_less_rear", "diagonals", "log_total")
 _MIX = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, 1.0], [1.0, -1.0, 1.0, -1.0]])
 
 
@@ -41,17 +42,18 @@ class Trim:
     Rotors are in this kit's order: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right.
     """
 
-    name: str
-    thrust: Array  # (4,)
+    log: str  # its name
     seconds: float  # length of the mean
-    noise: Array  # (4,) variance of ``features`` as means of one flight; zero: not known
+    thrust_share: Array  # (4,)
+    total: float
+    std: Array  # (4,) of ``features`` as means of one flight; zero: not known
     voltage: float = math.nan  # V, mean over the same time; NaN: not known
     session: str = ""  # common name of a session's flights; empty: not known
 
     @property
     def features(self) -> Array:
         """The four numbers, see ``features_of``."""
-        return features_of(self.thrust)
+        return features_of(self.thrust_share * self.total)
 
 
 def features_of(thrust: Array) -> Array:
@@ -95,12 +97,12 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     batch = np.cumsum(step) // BATCH
     batches = [batch == number for number in np.unique(batch)]
     # the last batch may be a short one
-    means = [thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() > 0.5 * BATCH]
-    numbers = [features_of(some) for some in means if some.min() > 0.0]
-    noise = np.var(numbers, axis=0, ddof=1) / len(numbers) if len(numbers) > 1 else np.zeros(4)
+    means = [thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() >= 0.5 * BATCH]
+    std = np.std(features_of(np.array(means)), axis=0, ddof=1) / math.sqrt(len(means))
     volts = np.empty(0) if log.voltage is None else log.voltage[steady]
     volts = volts[(volts > 0.0) & (volts < np.inf)]
-    return Trim(name, mean, seconds, noise, volts.mean() if volts.size else math.nan)
+    voltage = volts.mean() if volts.size else math.nan
+    return Trim(name, seconds, mean / mean.sum(), mean.sum(), std, voltage)
 
 
 def _steady(log: FlightLog, thrust: Array, vehicle: Vehicle) -> Mask:

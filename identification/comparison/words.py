@@ -12,9 +12,7 @@ from ...runtime.plain_values import plain
 from ..logs.table import Data, Values
 from ..logs.what_flew import PLACES
 from .change import NOWHERE, SOMETHING_ELSE, SURE, Change
-from .fault_channels import STEP
 from .fault_detection import ALL, NOTHING, OTHER, ROTORS, RotorFault
-from .trim import Trim
 
 # sentences with a place for the probability
 _NO_ROTOR = {
@@ -35,11 +33,11 @@ def _undecided(chances: Values) -> str:
 
 def change_headline(change: Change) -> str:
     """Return a sentence on the change, with its probability."""
-    place, chance = change.place, change.places[change.place]
-    if place == NOWHERE:
-        sure = f"Nothing changed (probability {chance:.2f})."
-        return sure if change.sure else _undecided(change.places)
+    place, chance = change.place, f"{change.probabilities[change.place]:.2f}"
     size = f"{100 * change.amount:.0f} ± {100 * change.amount_std:.0f} %"
+    if place == NOWHERE:
+        unchanged = f"Nothing changed (probability {chance})."
+        return unchanged if change.sure else _undecided(change.probabilities)
     if place == SOMETHING_ELSE:
         kind = "the rotors share the work otherwise than one weaker rotor or one weight would ask."
     elif place == "all rotors":
@@ -56,39 +54,13 @@ def change_headline(change: Change) -> str:
             f"carries as much more there ({change.carries_more:.2f}): these look alike."
         )
     if not change.sure:
-        return f"{_undecided(change.places)} If the first: {kind}"
-    return f"Changed: {place}, probability {chance:.2f}; {kind}"
+        return f"{_undecided(change.probabilities)} If the first: {kind}"
+    return f"Changed: {place}, probability {chance}; {kind}"
 
 
 def change_data(change: Change) -> Data:
     """Return the finding as plain data."""
-
-    def flight(trim: Trim) -> Data:
-        total = trim.thrust.sum()
-        return {
-            "log": trim.name,
-            "seconds": trim.seconds,
-            "thrust_share": trim.thrust / total,
-            "total": total,
-            "std": np.sqrt(trim.noise),
-            "voltage": trim.voltage,
-        }
-
-    names = ("left_less_right", "front_less_rear", "diagonals", "log_total")
-    found = change._asdict()
-    data: Data = plain(
-        found
-        | {
-            "headline": change_headline(change),
-            "place": change.place,
-            "sure": change.sure,
-            "probabilities": found.pop("places"),
-            "difference": dict(zip(names, change.difference, strict=True)),
-            "difference_std_if_unchanged": dict(zip(names, found.pop("std"), strict=True)),
-            "before": [*map(flight, change.before)],
-            "after": [*map(flight, change.after)],
-        }
-    )
+    data: Data = plain({"headline": change_headline(change), **change._asdict()})
     return data
 
 
@@ -129,8 +101,8 @@ def _draw_change(change: Change) -> Any:
     )
     left.legend()
     left.axis("equal")
-    names = sorted(change.places, key=change.places.__getitem__)
-    bars = right.barh(names, [change.places[name] for name in names], color=GREY)
+    names = sorted(change.probabilities, key=change.probabilities.__getitem__)
+    bars = right.barh(names, [change.probabilities[name] for name in names], color=GREY)
     bars[-1].set_color(AFTER)
     right.axvline(SURE, color=BLACK, ls="--")
     right.set(
@@ -141,54 +113,37 @@ def _draw_change(change: Change) -> Any:
     return figure
 
 
-def _named(fault: RotorFault, cause: str) -> str:
+def _in_words(fault: RotorFault, cause: str) -> str:
     """Return a cause; a rotor's with its place, and the log's own name if any."""
     if cause not in ROTORS:
         return cause
     names, i = fault.samples.motor_names, ROTORS.index(cause)
-    return f"{cause} ({PLACES[i]}{f'; {names[i]} in the log' if names else ''})"
+    return f"a fault of {cause} ({PLACES[i]}{f'; {names[i]} in the log' if names else ''})"
 
 
 def fault_headline(fault: RotorFault) -> str:
     """Return a sentence on the rotor fault, its time and size, with its probability."""
-    found, chance = fault.found, fault.probabilities[fault.found]
     if not fault.sure:
-        return _undecided(
-            {
-                f"{'a fault of ' * (cause in ROTORS)}{_named(fault, cause)}": p
-                for cause, p in fault.probabilities.items()
-            }
-        )
+        return _undecided({_in_words(fault, x): p for x, p in fault.probabilities.items()})
+    chance = fault.probabilities[fault.found]
     sure = f"(probability {f'{chance:.2f}' if chance < 0.9995 else 'above 0.999'})"
-    if found in _NO_ROTOR:
-        return _NO_ROTOR[found].format(sure)
-    when, low, high = fault.onset
-    lost, most, least = (100 - 100 * share for share in fault.remaining)
+    if fault.rotor is None:
+        return _NO_ROTOR[fault.found].format(sure)
+    rotor = _in_words(fault, fault.found).removeprefix("a fault of r")
+    low, high = fault.onset_ci95_s
+    lost, most, least = (100 - 100 * x for x in (fault.remaining, *fault.remaining_ci95))
     return (
-        f"R{_named(fault, found)[1:]} lost {lost:.0f} % of its thrust ({least:.0f} to {most:.0f}) "
-        f"at t = {when:.3f} s ({low:.3f} to {high:.3f}, the log's clock) {sure}."
+        f"R{rotor} lost {lost:.0f} % of its thrust ({least:.0f} to {most:.0f}) at t = "
+        f"{fault.onset_s:.3f} s ({low:.3f} to {high:.3f}, the log's clock) {sure}."
     )
 
 
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
-    samples = fault.samples
-    data: Data = {
-        "log": samples.name,
-        "headline": fault_headline(fault),
-        "found": fault.found,
-        "sure": fault.sure,
-        "probabilities": fault.probabilities,
-        "flight_s": len(samples.t) * STEP,
-        "ended_because": samples.ended or None,
-    }
-    of_rotor = ("rotor", "motor", "onset_s", "onset_ci95_s", "remaining", "remaining_ci95")
-    if fault.found not in ROTORS:
-        return data | dict.fromkeys(of_rotor)
-    i, names = ROTORS.index(fault.found), samples.motor_names
-    (onset, *when), (remaining, *share) = fault.onset, fault.remaining
-    values = (i + 1, names and names[i], onset, when, remaining, share)
-    return data | dict(zip(of_rotor, values, strict=True))
+    data: Data = {"headline": fault_headline(fault), **fault._asdict()}
+    del data["samples"]
+    data = plain(data)
+    return data
 
 
 def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:
@@ -207,10 +162,10 @@ def _draw_faults(faults: Sequence[RotorFault]) -> Any:
     panels = iter(figure.subplots(len(faults), 2, squeeze=False).flat)
     for fault in faults:
         t, found, samples = fault.samples.t, fault.found, fault.samples
-        chance = f"{_named(fault, found)}: {fault.probabilities[found]:.3f}"
+        chance = f"{_in_words(fault, found)}: {fault.probabilities[found]:.3f}"
         for title, what, lines, names in (
             (
-                Path(samples.name).name,
+                Path(fault.log).name,
                 "angular acceleration, rad/s2",
                 samples.angular_acceleration,
                 ("about x", "about y", "about z"),
@@ -222,7 +177,7 @@ def _draw_faults(faults: Sequence[RotorFault]) -> Any:
             room_above(panel)
             panel.legend(loc="upper left", ncols=len(names))
             panel.set(xlabel="t, s (the log's clock)", ylabel=what, title=title)
-            if found in ROTORS:
-                panel.axvline(fault.onset[0], color=BLACK, lw=1, ls="--")
-                panel.set_xlim(fault.onset[0] - 3.0, t[-1] + 0.1)
+            if fault.rotor:
+                panel.axvline(fault.onset_s, color=BLACK, lw=1, ls="--")
+                panel.set_xlim(fault.onset_s - 3.0, t[-1] + 0.1)
     return figure

@@ -39,7 +39,8 @@ def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), sessions=1):
         for i in range(count):
             numbers = middle + np.array(FLIGHT_STD) * rng.standard_normal(4)
             thrust = solve(MIX, np.append(numbers[:3], 1.0)) * np.exp(numbers[3])
-            out.append(Trim(f"{session}, {i}", thrust, 20.0, np.zeros(4)))
+            total = thrust.sum()
+            out.append(Trim(f"{session}, {i}", 20.0, thrust / total, total, np.zeros(4)))
     return out
 
 
@@ -49,7 +50,7 @@ def test_flights_without_a_change_are_never_given_a_sure_one():
     found = [compare(drawn(rng, 1), drawn(rng, 2)) for _ in range(60)]
     assert sum(c.sure and c.place != NOWHERE for c in found) <= 1
     assert sum(c.place == NOWHERE for c in found) > 55
-    assert all(sum(c.places.values()) == pytest.approx(1.0) for c in found)
+    assert all(sum(c.probabilities.values()) == pytest.approx(1.0) for c in found)
 
 
 def stated(found):
@@ -154,10 +155,10 @@ def test_another_battery_voltage_makes_the_total_less_certain():
     rng = default_rng(7)
     after = drawn(rng, 3, (0.0, 0.0, 0.0, 0.13))
     before = drawn(rng, 3)
-    assert compare(after, before).places["all rotors"] > 0.8
+    assert compare(after, before).probabilities["all rotors"] > 0.8
     low = [replace(trim, voltage=10.5) for trim in after]
     high = [replace(trim, voltage=12.0) for trim in before]
-    assert compare(low, high).places["all rotors"] < 0.7
+    assert compare(low, high).probabilities["all rotors"] < 0.7
 
 
 @pytest.mark.measured
