@@ -51,8 +51,6 @@ class Samples(NamedTuple):
     # (N,) possible error of the command between its own samples, in parts of the median: half of
     # the change from one to the next in the middle, nothing at either
     between: Array
-    # the command is thrust itself but for a factor (rotor speeds squared): no curve is looked for
-    thrust_known: bool
     motor_names: Names  # the log's own, of rotors 1 to 4; or none
     ended: str | None  # reason for the end of the search; None: the log's end
 
@@ -82,18 +80,18 @@ def samples_of(log: FlightLog, path: Path | None = None) -> Samples:
     Raises:
         InputError: one of the three is missing, or less than 3 s of flight.
     """
-    name, command = log.source or log.name, log.command
+    name = log.source or log.name
     motors: Names = ()
     if path and reader_by_content(path) is READERS["px4_ulog"]:
         (log_map, streams, *_), _ = px4_ulog.channels(path, has_ranges=False)
         if log_map.commands:
             motors = tuple(f"PX4 motor {i}" for i in log_map.commands.order)
     else:
-        values = np.square(log.rotor_speeds) if command is None else command
+        command = np.square(log.rotor_speeds) if log.command is None else log.command
         # a held command changes at its own samples alone
-        new = np.any(np.diff(values, axis=0, prepend=np.nan) != 0.0, axis=1)
+        new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
         new[-1] = True
-        streams = {"commands": Stream("commands", log.t[new], values[new])}
+        streams = {"commands": Stream("commands", log.t[new], command[new])}
         for part in ("gyro", "accelerometer"):
             if (values := getattr(log, part)) is not None:
                 streams[part] = Stream(part, log.t, values)
@@ -104,7 +102,7 @@ def samples_of(log: FlightLog, path: Path | None = None) -> Samples:
             f"{name}: no {' and no '.join(missing)}; expected all of gyro, accelerometer and "
             "motor commands, to look for a rotor that lost thrust"
         )
-    return sample(name, **found, thrust_known=command is None, motor_names=motors)
+    return sample(name, **found, motor_names=motors)
 
 
 def sample(
@@ -112,7 +110,6 @@ def sample(
     gyro: Stream,
     accelerometer: Stream,
     commands: Stream,
-    thrust_known: bool = False,
     motor_names: Names = (),
 ) -> Samples:
     """Put streams on the grid.
@@ -153,7 +150,6 @@ def sample(
         (np.convolve(keep, np.ones(ORDER + 1))[: len(keep)] > ORDER)[keep],
         Stream("command", fine, commands.at(fine) / usual),
         np.sqrt(off).mean(axis=1) * is_slow / usual,
-        thrust_known,
         motor_names,
         ended or None,
     )

@@ -65,8 +65,7 @@ class RotorFault(NamedTuple):
 
 def find_fault(samples: Samples) -> RotorFault:
     """Look for a rotor that lost thrust during a flight."""
-    curves = _CURVES[:1] if samples.thrust_known else _CURVES
-    tried = [FaultBalance(samples, _USUAL_LAG, curve) for curve in curves]
+    tried = [FaultBalance(samples, _USUAL_LAG, curve) for curve in _CURVES]
     curve = max(tried, key=attrgetter("log")).curve
     tried += [FaultBalance(samples, lag, curve) for lag in _LAGS]
     best = max(tried, key=attrgetter("log"))
