@@ -140,7 +140,6 @@ def sample(
     here, after = commands.at(t), np.searchsorted(commands.t, t)
     usual = np.median(here.mean(axis=1))
     off = np.abs((here - commands.values[after - 1]) * (commands.values[after] - here))
-    is_slow = np.diff(commands.t)[after - 1] > 1.5 * STEP
     return Samples(
         name,
         t,
@@ -149,7 +148,7 @@ def sample(
         _means(accelerometer, t)[:, 2],
         (np.convolve(keep, np.ones(ORDER + 1))[: len(keep)] > ORDER)[keep],
         Stream("command", fine, commands.at(fine) / usual),
-        np.sqrt(off).mean(axis=1) * is_slow / usual,
+        np.sqrt(off).mean(axis=1) / usual,
         motor_names,
         ended or None,
     )

@@ -1,12 +1,13 @@
 """Changes between two sets of flights, and rotor faults within one: sentences, data, pictures."""
 
 from collections.abc import Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...runtime.drawing import AFTER, BEFORE, BLACK, GREY, PALE, new_figure, room_above, styled
+from ...runtime.drawing import AFTER, BEFORE, BLACK, GREY, new_figure, room_above, styled
 from ...runtime.page_files import write_json, write_png
 from ...runtime.plain_values import plain
 from ..logs.table import Data, Values
@@ -26,9 +27,9 @@ _NAMED = 0.05  # least probability of a rival in the sentence
 
 def _undecided(chances: Values) -> str:
     """Return a sentence on an unsure finding and its rivals."""
-    order = sorted(chances, key=chances.__getitem__, reverse=True)
-    named = [f"{name} {chances[name]:.2f}" for name in order if chances[name] >= _NAMED]
-    return f"Undecided, by probability: {', '.join(named)}."
+    order = sorted(chances.items(), key=itemgetter(1), reverse=True)
+    named = ", ".join(f"{name} {chance:.2f}" for name, chance in order if chance >= _NAMED)
+    return f"Undecided, by probability: {named}."
 
 
 def change_headline(change: Change) -> str:
@@ -85,15 +86,11 @@ def _written(path: Path, data: Any, figure: Any) -> tuple[Path, Path]:
 def _draw_change(change: Change) -> Any:
     figure = new_figure(4.0)
     left, right = figure.subplots(1, 2)
-    for trims, colour, label in (
-        (change.before, BEFORE, "before"),
-        (change.after, AFTER, "after"),
-    ):
+    for trims, colour, label in ((change.before, BEFORE, "before"), (change.after, AFTER, "after")):
         # seen from above, front up: the vehicle's left is the picture's
-        x, y = np.transpose([[-100.0, 100.0] * trim.features[:2] for trim in trims])
-        left.plot(x, y, "o", color=colour, label=label, alpha=0.8)
-    left.axhline(0.0, color=PALE)
-    left.axvline(0.0, color=PALE)
+        x, y, *_ = 100.0 * np.transpose([trim.features for trim in trims])
+        left.plot(-x, y, "o", color=colour, label=label, ms=7, alpha=0.8)
+    left.grid()
     left.set(
         xlabel="left  -  thrust asked for, % of the total  -  right",
         ylabel="rear  -  % of the total  -  front",
@@ -101,9 +98,8 @@ def _draw_change(change: Change) -> Any:
     )
     left.legend()
     left.axis("equal")
-    names = sorted(change.probabilities, key=change.probabilities.__getitem__)
-    bars = right.barh(names, [change.probabilities[name] for name in names], color=GREY)
-    bars[-1].set_color(AFTER)
+    names, chances = zip(*sorted(change.probabilities.items(), key=itemgetter(1)), strict=True)
+    right.barh(names, chances, color=[*[GREY] * (len(names) - 1), AFTER])
     right.axvline(SURE, color=BLACK, ls="--")
     right.set(
         xlim=(0.0, 1.0),
@@ -140,9 +136,8 @@ def fault_headline(fault: RotorFault) -> str:
 
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
-    data: Data = {"headline": fault_headline(fault), **fault._asdict()}
+    data: Data = plain({"headline": fault_headline(fault), **fault._asdict(), "samples": None})
     del data["samples"]
-    data = plain(data)
     return data
 
 
@@ -152,32 +147,25 @@ def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path
     Raises:
         InputError: a file cannot be written.
     """
-    data = [*map(fault_data, faults)]
-    return _written(folder / "rotor_faults.json", data, _draw_faults(faults))
+    return _written(folder / "rotor_faults.json", [*map(fault_data, faults)], _draw_faults(faults))
 
 
 @styled()
 def _draw_faults(faults: Sequence[RotorFault]) -> Any:
     figure = new_figure(3.4 * len(faults))
-    panels = iter(figure.subplots(len(faults), 2, squeeze=False).flat)
-    for fault in faults:
-        t, found, samples = fault.samples.t, fault.found, fault.samples
-        chance = f"{_in_words(fault, found)}: {fault.probabilities[found]:.3f}"
-        for title, what, lines, names in (
-            (
-                Path(fault.log).name,
-                "angular acceleration, rad/s2",
-                samples.angular_acceleration,
-                ("about x", "about y", "about z"),
-            ),
-            (chance, "command, in parts of the median", samples.command.at(t), ROTORS),
-        ):
-            panel = next(panels)
-            panel.plot(t, lines, lw=1, label=names)
+    rows = figure.subplots(len(faults), 2, squeeze=False)
+    for fault, (left, right) in zip(faults, rows, strict=True):
+        t, chance = fault.samples.t, fault.probabilities[fault.found]
+        left.plot(t, fault.samples.angular_acceleration, label=["about x", "about y", "about z"])
+        left.set(ylabel="angular acceleration, rad/s2", title=Path(fault.log).name)
+        right.plot(t, fault.samples.command.at(t), label=ROTORS)
+        title = f"{_in_words(fault, fault.found)}: {chance:.3f}"
+        right.set(ylabel="command, in parts of the median", title=title)
+        for panel in (left, right):
             room_above(panel)
-            panel.legend(loc="upper left", ncols=len(names))
-            panel.set(xlabel="t, s (the log's clock)", ylabel=what, title=title)
+            panel.legend(loc="upper left", ncols=4)
+            panel.set_xlabel("t, s (the log's clock)")
             if fault.rotor:
-                panel.axvline(fault.onset_s, color=BLACK, lw=1, ls="--")
+                panel.axvline(fault.onset_s, color=BLACK, ls="--")
                 panel.set_xlim(fault.onset_s - 3.0, t[-1] + 0.1)
     return figure
