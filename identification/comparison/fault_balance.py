@@ -99,7 +99,7 @@ class FaultBalance:
 
 def _ramps(lag: float) -> Array:
     """Return the elapsed shares of a loss; see ``FaultBalance``."""
-    lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], len(STARTS) // 2)[:, None]
+    lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], 4)[:, None]
     elapsed = np.arange(2 + math.ceil(4.0 * lag / STEP)) - STARTS[:, None]
     since = STEP * np.maximum(elapsed, 0.0)
     # integral of 1 - exp(-since / lag)
@@ -168,8 +168,8 @@ class BalanceChannel:
         begun = np.append(ramp, np.ones(ORDER + 1))
         padded = np.pad(self.from_row_on, [(0, 0), (0, len(begun))])
         windows = sliding_window_view(padded, len(begun), axis=1)[:, rows]
-        *products, squares, weight, whole = windows
-        *known, own = np.array(products) @ np.diff(begun, prepend=0.0)
+        *known, own = windows[:-3] @ np.diff(begun, prepend=0.0)
+        squares, weight, whole = windows[-3:]
         outputs = whole * self.filtered(begun * weight)
         square = np.square(outputs[:, :-1]).sum(axis=1) + squares[:, -1]
         left = square - np.square(known).sum(axis=0)

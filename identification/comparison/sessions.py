@@ -56,20 +56,19 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> tuple[Array, Ar
     own = (flight[..., None] + noise.T)[..., None] * np.eye(len(x))  # (k, 4, n, n)
     # the vehicle's mean, the difference, and the flights
     columns = np.stack(np.broadcast_arrays(1.0, later, x.T), axis=-1)
-    means, variances, logs = [], [], []
+    ways = []
     for same, log in _cuts(flights, later, x):
         root = np.linalg.cholesky(own + session[..., None, None] * same)
         # triangular, of independent errors: the vehicle's mean is integrated out
         r = np.asarray(np.linalg.qr(np.linalg.solve(root, columns), mode="r"))
-        (a, _), (_, b) = np.moveaxis(r[..., :2, :2], (2, 3), (0, 1))
+        a, b = r[..., 0, 0], r[..., 1, 1]
         size = np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=2) + np.log(np.abs(a * b))
         left = size + 0.5 * np.square(r[..., 2:, 2]).sum(axis=2)
-        means.append(r[..., 1, 2] / b)
-        variances.append(b**-2.0)
-        logs.append(log - 0.5 * np.square(_SCALES).sum(axis=1) - left.sum(axis=1))
-    log = log_softmax(np.concatenate(logs))
-    keep = log > log.max() + _LEAST_LOG
-    return np.concatenate(means)[keep], np.concatenate(variances)[keep], log[keep]
+        log = log - 0.5 * np.square(_SCALES).sum(axis=1) - left.sum(axis=1)
+        ways.append((r[..., 1, 2] / b, b**-2.0, log))
+    mean, variance, logs = map(np.concatenate, zip(*ways, strict=True))
+    keep = logs > logs.max() + _LEAST_LOG
+    return mean[keep], variance[keep], log_softmax(logs)[keep]
 
 
 def _cuts(flights: Sequence[Trim], later: Mask, x: Array) -> Iterator[tuple[Mask, float]]:
@@ -81,9 +80,8 @@ def _cuts(flights: Sequence[Trim], later: Mask, x: Array) -> Iterator[tuple[Mask
     told = (names[:, None] == names) & (names != "")
     # between two flights without a name, of one set
     unknown = (names[1:] == "") & (names[:-1] == "") & ~np.diff(later)
-    apart = np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
-    places = np.argsort(np.where(unknown, -apart, np.inf), kind="stable")
-    places = places[: min(unknown.sum(), _MOST_ENDS)]
+    apart = unknown * np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
+    places = np.argsort(-apart, kind="stable")[: min(unknown.sum(), _MOST_ENDS)]
     rises = np.diff(volts) > _RISE * volts[:-1]  # False where one is not known
     chance = np.where(rises, _ENDS_AT_RISE, _ENDS)[places]
     for chosen in itertools.product((False, True), repeat=len(places)):
