@@ -7,7 +7,7 @@ battery acts on the total, too. A rotor's thrust for a request follows a power o
 power depends on the motor controllers, and on whether the firmware makes up for the battery. A
 difference of voltage therefore makes the total less certain.
 
-Possible changes, each by an amount that is integrated over:
+Possible changes, each by any amount (integrated out):
 
 * nothing;
 * a rotor delivers less than before for the same command (a cut propeller, a weak motor): its own
@@ -74,10 +74,10 @@ SURE = 0.95  # least probability of a place named without a doubt
 class Change(NamedTuple):
     """The change from the flights ``before`` to the flights ``after``."""
 
-    # of "nowhere", each rotor, each side, "all rotors" and "something else"; sum: 1
+    # "nowhere", each rotor, each side, "all rotors" and "something else"; sum: 1
     probabilities: dict[str, float]
     place: str  # the likeliest
-    sure: bool  # whether it is sure
+    sure: bool  # at least ``SURE``
     # probabilities of either kind there, if a rotor: weaker, or a weight
     weaker: float
     carries_more: float
@@ -114,7 +114,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         off = np.square(mean[:, None] - means) / variance + np.log(variance)
         logs.append(logsumexp(ways[:, None] - 0.5 * off.sum(axis=2), axis=0) + math.log(chance))
     prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
-    chances = softmax(np.array(logs) + prior)  # of each change by each amount
+    chances = softmax(np.array(logs) + prior)  # each change by each amount
     at = np.array([place for place, _ in _CHANGES])
     places = {place: float(chances[at == place].sum()) for place in at.tolist()}
     place = max(places, key=places.__getitem__)

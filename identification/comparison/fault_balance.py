@@ -31,8 +31,8 @@ from .fault_channels import ORDER, STEP, Samples
 # signs of the rotors' moments about x, y, z; the last row is the force along z
 SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
 BEFORE, AFTER = 25, 4  # least intervals of usual flight before a fault, and after one
-# starts of a loss within an interval: at once (a propeller that breaks), or as the rotors' speed
-# falls (a motor)
+# starts of a loss within an interval: at once (a broken propeller), or as the rotors' speed falls
+# (a motor)
 STARTS = np.tile([0.0, 0.25, 0.5, 0.75], 2)
 _AT_ONCE = 1e-9  # s, a lag
 _AROUND = 5  # intervals around a strong acceleration: the model may be as wrong there
@@ -80,7 +80,7 @@ class FaultBalance:
         step: list[Array] = []  # none, and then the likeliest jump beside the noise
         nothing: list[float] = []
         for _ in range(3):
-            self.channels = [BalanceChannel(x, activity, samples.whole, *step) for x in columns]
+            self.channels = [_BalanceChannel(x, activity, samples.whole, *step) for x in columns]
             nothing.append(sum(channel.nothing for channel in self.channels))
             k = BEFORE + int(np.argmax(self.steps(self.rows, self.ramps[:1])))
             begin = max(k - 2, BEFORE)
@@ -106,7 +106,7 @@ def _ramps(lag: float) -> Array:
     return np.asarray(np.diff(since + lags * np.expm1(-since / lags)) / STEP)
 
 
-class BalanceChannel:
+class _BalanceChannel:
     """A channel's moment, free columns and measurement as innovations of the noise.
 
     Args:
@@ -129,12 +129,12 @@ class BalanceChannel:
         self.filtered, self.whole = partial(lfilter, whitener, 1.0), whole
         self.white = self._innovations(columns)
         directions, r = np.linalg.qr(self.white.T)
-        # the last one is what no column explains of the measurement
+        # the last direction is the measurement, less all columns
         directions[:, -1] *= r[-1, -1]
         self.rest = r[-1, -1] ** 2
         self.nothing = _log_likelihood(self.rest, self.weight[whole])
         # products of an impulse in each row with all directions: the filter runs backwards. A step
-        # is a row of impulses; and the sum of its squares, had it begun long before
+        # is a row of impulses. Behind them the sum of squares of a step since ever
         products = self.filtered(directions.T[:, ::-1]) * self.weight[::-1]
         squares = np.square(self._innovations(np.ones(len(whole))))[::-1]
         sums = np.vstack([products, squares]).cumsum(axis=1)[:, ::-1]

@@ -21,7 +21,7 @@ from ..logs.reading import READERS, reader_by_content
 from ..logs.table import Data, Names, median_step
 from ..motion.smoothing import lagged
 
-ORDER = 10  # of the noise's autoregression
+ORDER = 10  # the autoregression's, of the noise
 STEP = 0.02  # s, grid: a rotor takes about as long to follow
 FINE = 0.004  # s, grid of commands for the rotors' lag
 SETTLED = 1.5  # s after the rotors first carry the vehicle, until it is off the ground

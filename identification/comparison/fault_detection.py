@@ -30,7 +30,7 @@ ROTORS = ("rotor 1", "rotor 2", "rotor 3", "rotor 4")
 _LOSSES = np.linspace(0.05, 1.0, 39)  # tried shares of a rotor's thrust
 _ALL_LOSE = 0.5  # the largest share tried for all rotors together
 _LAGS = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
-_USUAL_LAG = 0.05  # s, at which the curves are tried
+_USUAL_LAG = 0.05  # s, beside each of the curves
 # curves of thrust against command: the square's share, and the dead zone in parts of the
 # median command
 _CURVES = ((0.0, 0.0), (0.2, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.3), (1.0, 0.3))
@@ -51,9 +51,9 @@ class RotorFault(NamedTuple):
     log: str  # its name
     flight_s: float
     ended_because: str | None  # reason for the end of the search; None: the log's end
-    probabilities: dict[str, float]  # of nothing, each rotor, all rotors, and another cause; sum: 1
+    probabilities: dict[str, float]  # nothing, each rotor, all rotors, and another cause; sum: 1
     found: str  # the likeliest
-    sure: bool  # whether it is sure
+    sure: bool  # at least ``SURE``
     rotor: int | None = None  # 1 to 4
     motor: str | None = None  # the log's own name
     # onset as median, share of thrust as mean, each with a 95 % interval
@@ -111,8 +111,8 @@ def _patterns(best: FaultBalance) -> ArrayPair:
     each = _LOSSES[:, None]
     few = each[_LOSSES <= _ALL_LOSE]
     jump = np.tile(best.share[:, None], 4)
-    # of each cause: its shape in the channels (N, 4), and by amount the means and standard
-    # deviations of its size there, for a jump in parts of one rotor's usual torque or force
+    # each cause's shape in the channels (N, 4), and by amount the means and standard deviations of
+    # its size there. A bare jump is in parts of one rotor's usual torque or force
     causes = [
         *((jump * best.thrust[:, [i]] * SIGNS[:, i], each, _ERROR * each) for i in range(4)),
         (jump, few * [0.0, 0.0, 0.0, 4.0], _ERROR * few * [2.0, 2.0, 2.0, 4.0]),
