@@ -115,20 +115,21 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         logs.append(logsumexp(ways[:, None] - 0.5 * off.sum(axis=2), axis=0) + math.log(chance))
     prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
     chances = softmax(np.array(logs) + prior)  # each change by each amount
-    at = np.array([place for place, _ in _CHANGES])
+    at, kinds = np.array([*_CHANGES]).T
     places = {place: float(chances[at == place].sum()) for place in at.tolist()}
     place = max(places, key=places.__getitem__)
-    rows = chances[at == place]
-    kinds = rows.sum(axis=1) / places[place]
-    by_kind = dict(zip([kind for at, kind in _CHANGES if at == place], kinds.tolist(), strict=True))
-    amounts, weights = _AMOUNTS * (place != NOWHERE), rows[kinds.argmax()]
+    weaker, carries_more = (
+        float(chances[(at == place) & (kinds == kind)].sum()) / places[place]
+        for kind in ("weaker", "carries more")
+    )
+    amounts, weights = _AMOUNTS * (place != NOWHERE), max(chances[at == place], key=np.sum)
     amount = np.average(amounts, weights=weights)
     return Change(
         places,
         place,
         places[place] >= SURE,
-        by_kind.get("weaker", 0.0),
-        by_kind.get("carries more", 0.0),
+        weaker,
+        carries_more,
         amount,
         math.sqrt(np.average(np.square(amounts - amount), weights=weights)),
         dict(zip(FEATURES, np.exp(ways) @ mean, strict=True)),

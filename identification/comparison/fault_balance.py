@@ -120,9 +120,9 @@ class _BalanceChannel:
         from scipy.signal import lfilter  # as late as can be: it takes .6 s
 
         y, x = columns[-1], np.vstack([columns[:-1], *step])
-        residual = y - (beta := np.linalg.lstsq(x.T, y, rcond=None)[0]) @ x
-        if beta[0] <= 0.0:  # a moment with a negative factor is left out
-            residual = y - np.linalg.lstsq(x[1:].T, y, rcond=None)[0] @ x[1:]
+        moment = np.linalg.lstsq(x.T, y, rcond=None)[0][0]
+        x = x[int(moment <= 0.0) :]  # a moment with a negative factor is left out
+        residual = y - np.linalg.lstsq(x.T, y, rcond=None)[0] @ x
         weights = 1.0 / np.hypot(1.0, np.outer(SHARES, activity))
         fits = [_fit_noise(residual, weight, whole) for weight in weights]
         _, self.variance, whitener, self.weight = max(fits, key=itemgetter(0))
