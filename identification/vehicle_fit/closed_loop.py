@@ -77,8 +77,7 @@ def fit_loop(
     group = np.concatenate([*(part.segment for part in thin), [-1]])
     # distances (n, 4) of a flight's starts at the horizon's end if nothing changes
     far = [np.linalg.norm(offsets(p.unchanged, p.seen)[:, -1], axis=-1) for p in thin]
-    both = np.concatenate([each + each.mean(axis=0) for each in far])
-    sizes: Array = np.maximum(both, _LEAST)[:, None, :, None]
+    sizes = np.concatenate([d + d.mean(axis=0) + _LEAST for d in far])[:, None, :, None]
     speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
     turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
     usual = replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))
