@@ -68,8 +68,8 @@ def identify(
     if out.suffix not in (".yaml", ".yml"):
         raise InputError(f"--out {out}: expected a name that ends in .yaml")
     where = parse_geometry(geometry)
-    common = (begin, math.inf if end is None else end)
-    if not common[0] < common[1]:
+    common = begin, math.inf if end is None else end
+    if end is not None and end <= begin:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
     if len({*parts}) < len(parts):  # no fit may predict its own flight
@@ -92,8 +92,10 @@ def identify(
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
     log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
-    sentence, seconds = headline(identified), identified.fit.balance.seconds
-    console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {sentence}.")
+    sentence = headline(identified)
+    console.print(
+        f"{identified.fit.balance.seconds:.0f} s of flight, mass {mass:g} kg: {sentence}."
+    )
     show_table(
         ("quantity", "value", "± (95 %)", "unit", ""),
         [

@@ -64,6 +64,9 @@ def vehicle_of(
     if late:
         lag = get(of_lag).coefficients[0].name
         coefficients[Role.LAG] = {lag: estimates[of_lag].value}
+    effects = [EffectSetting(effect_of(r), c) for r, c in coefficients.items() if c]
+    if (behind := shown.get("time_offset", 0.0)) > 0.0:
+        effects.append(EffectSetting("latency", {"d": behind}))
     inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
     even = np.allclose(geometry.positions, geometry.arm * QUADRANT)
     vehicle = Vehicle(
@@ -80,7 +83,7 @@ def vehicle_of(
         spin=model.spin.copy(),
         rotor_positions=None if even else geometry.positions,
         com=np.array([shown.get(f"com {a}", 0.0) for a in "xyz"]),
-        effects=tuple(EffectSetting(effect_of(r), c) for r, c in coefficients.items() if c),
+        effects=tuple(effects),
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),
     )

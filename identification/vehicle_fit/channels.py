@@ -53,6 +53,14 @@ class MotionPiece(NamedTuple):
     command: Array | None = None  # (n, 4), 0 to 1
     voltage: Array | None = None  # (n,) V
 
+    def set_back(self, late: int) -> "MotionPiece":
+        """Return the piece with its rotors ``late`` samples later; the first or last sample holds
+        at the end.
+        """
+        rows = np.clip(np.arange(len(self.t)) - late, 0, len(self.t) - 1)
+        of_rotors = {n: getattr(self, n) for n in ("rotor_speeds", "command", "voltage")}
+        return self._replace(**{n: x[rows] for n, x in of_rotors.items() if x is not None})
+
     def measured(self) -> Array:
         """Return specific force and angular acceleration (n, 6)."""
         return np.column_stack([self.specific_force, self.angular_acceleration])

@@ -94,7 +94,7 @@ def fit_loop(
         for part in thin:
             at = np.rint(shares * len(part.ahead)).astype(int) - 1
             each.append(offsets(part.flown(model)[:, at], part.seen[:, at]))
-        return np.concatenate(each) / sizes
+        return np.asarray(np.concatenate(each) / sizes)
 
     start = begin if near is None else np.array(astuple(near))
     bound, x = (((at - begin) / _SIZES)[free] for at in (_LOWEST, start))

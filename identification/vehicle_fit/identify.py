@@ -24,7 +24,7 @@ from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
 from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .closed_loop import UNITS
-from .columns import ANSWERED_HZ, balance
+from .columns import ANSWERED_HZ
 from .effect_settings import effect_of
 from .estimates import estimates_of, thrust_of
 from .geometry import Geometry
@@ -49,6 +49,7 @@ _CLOSE = 0.01  # share of thrust: two bands may differ by it at any interval
 _LEAST_VOLTAGE_RANGE = 0.03  # share: no exponent is fitted to a smaller range of voltage
 _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
 _NO_OFFSET = 1e-6  # s, deviation of an absent time offset
+_ALIGNMENTS = 4  # at most, each by the offset of the fit before
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
 WITHOUT_FORCE = "an unchanged velocity predicts data outside the fit better than the force"
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
@@ -138,7 +139,7 @@ def identify(
         return named, vehicle_of(name, part, named, logs, step, motors)
 
     report(0.9, "predicting what is held out")
-    tested = held_out(pieces, logs, fit, lambda part, why: described(part, why)[1])
+    tested = held_out(logs, fit, lambda part, why: described(part, why)[1])
     named, vehicle = described(fit, tested.why)
     check_thrust(vehicle, not basic.commands, logs[0].name)
     _, excess = nearest_body(fit)
@@ -241,15 +242,13 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
     """Return the fit of the basic model."""
     if not basic.commands:
         model, start = first_model(pieces, basic, "delay")
-        plain = solve(pieces, model, start)
-        # do the logged speeds lead the motion as commands do?
+        plain = _aligned(solve(pieces, model, start))
+        # do the logged speeds lead the motion as commands do? An offset passes for a lag and a lag
+        # for an offset: the search starts from both
         model, start = plain.model.with_more(plain.theta, "lag")
-        late = balance(pieces, replace(model, speed_noise=0.0), start)
-        _, (lag,), (size,) = score_tests(plain, {"lag": ("lag",)}, late)["lag"]
-        if lag < _LEAST_LAG * size:
-            return plain
         start[-1] = _LAGS[0]
-        other = solve(pieces, model, start)
+        both = [_aligned(solve(pieces, replace(model, late=x), start)) for x in (0.0, model.late)]
+        other = min(both, key=lambda f: f.loss)
         lag, low, _ = other.interval("lag", logarithm=False)
         sure = lag > _LEAST_LAG * (lag - low) / other.width
         return other if sure and plain.loss - other.loss > _cost(plain, 1) else plain
@@ -259,7 +258,8 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         model, start = first_model(pieces, replace(basic, exponents=exponents), *nonlinear)
         starts = ([*start[:-1], lag] for lag in lags)
-        fit = min((solve(pieces, model, np.array(x)) for x in starts), key=lambda f: f.loss)
+        fits = (_aligned(solve(pieces, model, np.array(x))) for x in starts)
+        fit = min(fits, key=lambda f: f.loss)
         cost = fit.loss + _cost(fit, len(exponents))
         thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
@@ -270,6 +270,16 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
             "thrust does not grow with the motor commands; expected cmd1..cmd4, 0 to 1"
         )
     return best[1]
+
+
+def _aligned(fit: VehicleFit) -> VehicleFit:
+    """Return the fit with the rotors' columns set back by its own time offset, to a sample."""
+    for _ in range(_ALIGNMENTS):
+        late = fit.values["delay"]
+        if abs(late - fit.model.late) < fit.balance.pieces[0].period:
+            break
+        fit = fit.again(late=late)
+    return fit
 
 
 def _agreeing(fit: VehicleFit) -> VehicleFit:
