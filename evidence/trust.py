@@ -54,6 +54,7 @@ STUDIES: Mapping[str, Study] = {
         "racer",
         7.0,
     ),
+    "simulated_vehicles": Study("simulated_vehicles", "", "", 4.0),
     "unseen_flights": Study("unseen_flights", "--data {data}", "nanobench", 8.0),
     "other_engines": Study("other_engines", "", "", 1.0),
     "probabilities": Study(
