@@ -54,8 +54,8 @@ STUDIES: Mapping[str, Study] = {
         "racer",
         7.0,
     ),
-    "simulated_vehicles": Study("simulated_vehicles", "", "", 4.0),
     "unseen_flights": Study("unseen_flights", "--data {data}", "nanobench", 8.0),
+    "simulated_vehicles": Study("simulated_vehicles", "", "", 4.0),
     "other_engines": Study("other_engines", "", "", 1.0),
     "probabilities": Study(
         "probabilities", "--simulator {data}/../generator/make_flights.py", "../generator", 6.0
