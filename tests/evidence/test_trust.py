@@ -27,7 +27,7 @@ def test_studies_of_other_code_run_and_others_are_left_out(tmp_path, monkeypatch
     assert written == ["trust.md"]
     assert "recovery: kept result is of this code" in out
     assert "fan_wall: no folder" in out
-    assert "0 of 2 done, 0.0 h of one core left" in out
+    assert "0 of 2 done, 0.1 h of one core left" in out
     with refused("study"):
         trust.study(["fan"], tmp_path)
 
