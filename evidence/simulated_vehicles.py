@@ -115,6 +115,15 @@ def held(rows: Sequence[dict[str, Any]]) -> tuple[int, int]:
     return int(sum(every)), len(every)
 
 
+def missed(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the losses in words."""
+    right, _, count = near(rows)
+    return (
+        f"leaves `Jxx` assumed or more than {100 * NEAR:g} % off on {share(count - right, count)}; "
+        f"95 % intervals hold the truth {share(*held(rows))}."
+    )
+
+
 def page_rows(rows: Sequence[dict[str, Any]]) -> Iterator[tuple[str, str, str]]:
     """Yield the rows of the page: subject, figure and target."""
     right, plain, count = near(rows)
