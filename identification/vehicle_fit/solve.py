@@ -172,17 +172,15 @@ def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
 
 
 def score_tests(
-    fit: VehicleFit, groups: Mapping[str, Sequence[str]], made: BalanceSpectra | None = None
+    fit: VehicleFit, groups: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[float, Array, Array]]:
     """Return, for each group of further parameters alone, the fall of twice the negative
-    log-likelihood, the parameters after one step from 0, and their standard deviations.
-
-    The last two are in SI units; ``made`` stands in place of the fit's own transforms.
+    log-likelihood, the parameters after one step from 0, and their standard deviations, both in SI
+    units.
     """
     model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
-    made = made or fit.balance
-    grams = np.sum(_grams(made, fit.spectra, model.band), axis=0)
-    step, information, *_ = _newton(made, grams, model, start)
+    grams = np.sum(_grams(fit.balance, fit.spectra, model.band), axis=0)
+    step, information, *_ = _newton(fit.balance, grams, model, start)
     # information of the further parameters while the fit's own follow, and behind it the slope
     both, n, tests = np.column_stack([information, information @ step]), len(fit.theta), {}
     both = both[n:, n:] - information[n:, :n] @ np.linalg.solve(information[:n, :n], both[:n, n:])
