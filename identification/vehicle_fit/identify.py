@@ -314,6 +314,14 @@ def _cost(fit: VehicleFit, parameters: int) -> float:
     return _PENALTY * parameters * math.log(6 * frequencies)
 
 
+def _above(fit: VehicleFit, name: str) -> float:
+    """Return the size of a further effect above the bound of the search, standard deviations."""
+    at = [fit.model.free.index(p) for p in FURTHER[name].parameters]
+    theta, covariance = fit.theta[at], fit.covariance[np.ix_(at, at)]
+    size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
+    return size - math.sqrt(_cost(fit, len(at)))
+
+
 def _with_optional(fit: VehicleFit) -> VehicleFit:
     """Return a fit with further effects, and a hidden moment of velocity.
 
@@ -344,12 +352,15 @@ def _with_optional(fit: VehicleFit) -> VehicleFit:
         if all(richer.values[p] > 0.0 for f in asked if f.positive for p in f.parameters):
             fit = richer
             kept[name] = ""
+    # a later effect may stand for an earlier one
+    while kept and _above(fit, name := min(kept, key=lambda n: _above(fit, n))) < 0.0:
+        del kept[name]
+        stays = [p not in FURTHER[name].parameters for p in fit.model.free]
+        free = tuple(p for p, stay in zip(fit.model.free, stays, strict=True) if stay)
+        fit = fit.again(fit.theta[stays], free=free)
     # an effect taken because it stood out is too large on average, if another flight of the same
     # vehicle would hide it: its interval reaches down to sizes below the bound
     for name in kept:
-        at = [fit.model.free.index(p) for p in FURTHER[name].parameters]
-        theta, covariance = fit.theta[at], fit.covariance[np.ix_(at, at)]
-        size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
-        if size < math.sqrt(_cost(fit, len(at))) + fit.width:
+        if _above(fit, name) < fit.width:
             kept[name] = "it shows, but by so little that what shows is too large on average"
     return replace(fit, kept=kept, hidden=hidden)
