@@ -34,7 +34,7 @@ def compare(
     """
     from ..identification.comparison.change import compare as find_change
     from ..identification.comparison.trim import trim_of_log
-    from ..identification.comparison.words import change_data, change_headline, write_change
+    from ..identification.comparison.words import change_data, write_change
 
     if example:
         if logs or against:
@@ -59,7 +59,8 @@ def compare(
     ]
     change = find_change(trims[: len(logs)], trims[len(logs) :])
     written = write_change(change, folder)
-    console.print(change_headline(change))
+    result = change_data(change)
+    console.print(result["headline"])
     console.print(f"vehicle: {model.name}")
     log_notes(text for log in every for text in log.notes)
     for session in dict.fromkeys(sessions) if by_folder else ():
@@ -67,11 +68,11 @@ def compare(
             part.count(session) for part in (sessions[: len(logs)], sessions[len(logs) :])
         )
         console.print(f"session {session}: {after} after, {before} before")
-    places = sorted(change.places.items(), key=lambda item: -item[1])
+    places = sorted(change.probabilities.items(), key=lambda item: -item[1])
     rows = [(name, f"{chance:.3f}") for name, chance in places]
     show_table(("where something changed", "probability"), rows)
     say(*written)
-    return change_data(change)
+    return result
 
 
 class LogsAgainstLogs(TyperCommand):

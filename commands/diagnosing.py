@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import InputError
-from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights
+from .flight_logs import AS_THEY_ARE, LogOptions, log_notes, read_flights, read_logs
 from .terminal import command_line, console, results_folder, say, show_page, show_table, working
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ def _with_rotor_faults(
     diagnosis: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
 ) -> "Diagnosis":
     """Add losses of a rotor's thrust during a flight, for logs fit to show one."""
-    from ..identification.comparison.fault_channels import read_channels
+    from ..identification.comparison.fault_channels import samples_of
     from ..identification.comparison.fault_detection import find_fault
     from ..identification.comparison.words import fault_data
 
@@ -161,7 +161,7 @@ def _with_rotor_faults(
     with working("looking for a rotor that lost thrust"):
         for path, log in zip(paths, flights, strict=True):
             try:
-                faults.append(fault_data(find_fault(read_channels(path, log=log)[0])))
+                faults.append(fault_data(find_fault(samples_of(log, path))))
             except InputError:
                 continue  # no gyro, no accelerometer, no command, or too little flight
     notes = tuple(data["headline"] for data in faults if data["rotor"] is not None)
@@ -171,24 +171,24 @@ def _with_rotor_faults(
 def _rotor_faults(logs: Sequence[Path], reading: LogOptions, out: Path) -> dict[str, Any]:
     """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
     from ..dynamics.vehicle_file import load_vehicle
-    from ..identification.comparison.fault_channels import read_channels
+    from ..identification.comparison.fault_channels import samples_of
     from ..identification.comparison.fault_detection import find_fault
-    from ..identification.comparison.words import fault_data, fault_headline, write_faults
+    from ..identification.comparison.words import fault_data, write_faults
 
     model = None if reading.vehicle is None else load_vehicle(reading.vehicle)
-    read = [read_channels(path, reading.reader, model, reading.map) for path in logs]
+    flights = read_logs(logs, reading, model)
     folder = results_folder(out)
     faults = []
     with working("looking for a rotor that lost thrust") as progress:
-        for i, (channels, _) in enumerate(read):
-            progress(i / len(read))
-            faults.append(find_fault(channels))
+        for i, (path, log) in enumerate(zip(logs, flights, strict=True)):
+            progress(i / len(logs))
+            faults.append(find_fault(samples_of(log, path)))
     written = write_faults(faults, folder)
-    log_notes(text for _, notes in read for text in notes)
-    for fault in faults:
-        samples = fault.samples
-        ended = f"; nothing later: {samples.ended}" if samples.ended else ""
-        console.print(f"{samples.channels.name}: {fault.seconds:.1f} s in flight{ended}")
-        console.print(fault_headline(fault))
+    log_notes(text for log in flights for text in log.notes)
+    result = [fault_data(fault) for fault in faults]
+    for data in result:
+        ended = f"; nothing later: {data['ended_because']}" if data["ended_because"] else ""
+        console.print(f"{data['log']}: {data['flight_s']:.1f} s in flight{ended}")
+        console.print(data["headline"])
     say(*written)
-    return {"rotor_faults": [fault_data(fault) for fault in faults]}
+    return {"rotor_faults": result}

@@ -49,6 +49,7 @@ def identify(
 
     Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
     """
+    from ..identification.motion.signals import known_pieces
     from ..identification.prediction import errors_of_models
     from ..identification.vehicle_fit.exports import EXPORTS
     from ..identification.vehicle_fit.geometry import parse_geometry
@@ -66,29 +67,35 @@ def identify(
     out = result_file(out, "vehicle.yaml")
     if out.suffix not in (".yaml", ".yml"):
         raise InputError(f"--out {out}: expected a name that ends in .yaml")
-    if not (math.isfinite(mass) and 0.0 < mass < 1e4):
-        raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
     where = parse_geometry(geometry)
-    common = (begin, math.inf if end is None else end)
-    if not common[0] < common[1]:
+    common = begin, math.inf if end is None else end
+    if end is not None and end <= begin:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in (*logs, *(test or ()))]
+    if len({*parts}) < len(parts):  # no fit may predict its own flight
+        raise InputError(
+            f"{max(parts, key=parts.count)[0]}: is given twice; expected each flight once, in the "
+            "fit or in --test"
+        )
     flights = read_logs([path for path, _ in parts], LogOptions(reader, map, piece))
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
+    for flight in unseen:
+        known_pieces(flight)  # refuses one without a pose before the fit
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
         identified = fit(flights, mass, where, windows[: len(logs)], out.stem, report=progress)
     if unseen:
         with working("predicting"):
-            parts_of = [[window] for window in windows[len(logs) :]]
             models = identified.vehicle, models_of(identified.vehicle)[SIMPLEST]
-            further = errors_of_models(unseen, models, windows=parts_of)
+            further = errors_of_models(unseen, models, 0.5, [[w] for w in windows[len(logs) :]])
         identified = identified._replace(predicted={**identified.predicted, "prediction": further})
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
     log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
-    seconds = identified.fit.balance.seconds
-    console.print(f"{seconds:.0f} s of flight, mass {mass:g} kg: {headline(identified)}.")
+    sentence = headline(identified)
+    console.print(
+        f"{identified.fit.balance.seconds:.0f} s of flight, mass {mass:g} kg: {sentence}."
+    )
     show_table(
         ("quantity", "value", "± (95 %)", "unit", ""),
         [
@@ -112,7 +119,7 @@ def identify(
             table_of(vehicle, simplest),
         )
     console.print(use_of(identified))
-    result = {"headline": headline(identified), **identified_data(identified)}
+    result = {"headline": sentence, **identified_data(identified)}
     if export is not None:
         text = EXPORTS[export](identified)
         console.print(text, soft_wrap=True)

@@ -102,7 +102,6 @@ def look(
         console.print(then, soft_wrap=True)
     say(page)
     show_page(page, not no_open)
-    console.print(sentence)
     return {**results, "sentence": sentence, "page": page}
 
 

@@ -179,7 +179,8 @@ class LoopReaction:
     with the model's angular acceleration ``m``, the angular velocity ``w`` and the velocity
     ``v' = (v_y, -v_x)`` in body axes. The share is of measured moments in the mean square of all,
     ``M^2 / (M^2 + unmeasured^2)``, M the RMS of ``m + flapping v'`` over the horizon. Yaw has a
-    gain and a damping.
+    gain and a damping. With gains, flapping and M, ``m`` and ``v'`` count from their means in the
+    flight so far: rotors answer constant moments, which differ from flight to flight.
 
     Attributes:
         roll_gain: of the model's angular acceleration about x.

@@ -40,9 +40,9 @@ from windwrench.evidence.residual_wrench import residual_wrench
 from windwrench.evidence.runner import start
 from windwrench.identification.comparison.change import NOWHERE, Change
 from windwrench.identification.comparison.change import compare as compare_sets
-from windwrench.identification.comparison.fault_channels import read_channels
+from windwrench.identification.comparison.fault_channels import samples_of
 from windwrench.identification.comparison.fault_detection import find_fault
-from windwrench.identification.comparison.trim import Trim, carrying, trim_of, trim_of_log
+from windwrench.identification.comparison.trim import Trim, trim_of_log
 from windwrench.identification.comparison.words import fault_data
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.diagnosis.commanded_rotors import in_flight
@@ -226,14 +226,12 @@ def crazypad_e8(folder: Path) -> list[dict[str, Any]]:
     """Compare every flight of vehicle E8 in CrazyPAD's ``data/motor_data`` with all other normal
     ones; tape on a propeller is left out, of which nobody knows what it should do.
     """
-    trims = {}
+    vehicle, trims = load_vehicle("crazyflie"), {}
     for path in sorted(folder.glob("*/E8_log*")):
         if not path.parent.name.startswith("tape"):
             log = read_log(path, "crazyflie_sd")
-            assert log.command is not None
-            steady = carrying(log.t, log.command.sum(axis=1))
-            name = f"{path.parent.name}__{path.name}"
-            trims[name] = trim_of(name, log.t, log.command, steady, log.voltage)
+            commands = replace(log, rotor_speeds=np.full_like(log.rotor_speeds, np.nan))
+            trims[f"{path.parent.name}__{path.name}"] = trim_of_log(commands, vehicle)
     return _each_compared(trims)
 
 
@@ -255,16 +253,18 @@ def _each_compared(trims: Mapping[str, Trim]) -> list[dict[str, Any]]:
 def _compared(name: str, change: Change) -> dict[str, Any]:
     """Return the answer of a comparison, beside the truth."""
     truth = truth_of(name)
-    if_changed = max((p for p in change.places if p != NOWHERE), key=change.places.__getitem__)
+    if_changed = max(
+        (p for p in change.probabilities if p != NOWHERE), key=change.probabilities.__getitem__
+    )
     return {
         "flight": name.removesuffix(".csv.gz"),
         "truth": truth,
         "place": change.place,
-        "probability": change.places[change.place],
+        "probability": change.probabilities[change.place],
         "if_changed": if_changed,
-        "changed": 1.0 - change.places[NOWHERE],
+        "changed": 1.0 - change.probabilities[NOWHERE],
         "sure": change.sure,
-        "difference": change.difference.tolist(),
+        "difference": [*change.difference.values()],
         "right": change.place == truth,
         "right_if_changed": truth == NOWHERE or if_changed == truth,
         "sure_and_wrong": change.sure and change.place != truth,
@@ -274,7 +274,7 @@ def _compared(name: str, change: Change) -> dict[str, Any]:
 def motor_faults(folder: Path) -> list[dict[str, Any]]:
     """Search each ULog, and read from it what was commanded to fail, and when."""
     return [
-        fault_data(find_fault(read_channels(path)[0]))
+        fault_data(find_fault(samples_of(read_log(path), path)))
         | {"log": path.name, "commanded": commanded_fault(path)}
         for path in sorted(folder.glob("*.ulg"))
     ]

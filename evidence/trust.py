@@ -47,7 +47,7 @@ STUDIES: Mapping[str, Study] = {
         part: Study("measured_flights", f"--part {part} --data {{data}}", folder, 2.0)
         for part, (folder, _) in PARTS.items()
     },
-    "nanodrone": Study("nanodrone_benchmark", "--data {data}/idsia --runs 1", "idsia", 20.0),
+    "nanodrone": Study("nanodrone_benchmark", "--data {data}/idsia --runs 1", "idsia", 7.0),
     "published": Study(
         "published",
         "--racer {data}/racer --imu {data}/crazyflie_imu --crazyflies {data}/crazyflies",
@@ -55,6 +55,7 @@ STUDIES: Mapping[str, Study] = {
         7.0,
     ),
     "unseen_flights": Study("unseen_flights", "--data {data}", "nanobench", 8.0),
+    "simulated_vehicles": Study("simulated_vehicles", "", "", 4.0),
     "other_engines": Study("other_engines", "", "", 1.0),
     "probabilities": Study(
         "probabilities", "--simulator {data}/../generator/make_flights.py", "../generator", 6.0

@@ -5,7 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from windwrench.evidence import measured_flights, other_engines, published, unseen_flights
+from windwrench.evidence import (
+    measured_flights,
+    other_engines,
+    published,
+    simulated_vehicles,
+    unseen_flights,
+)
 from windwrench.evidence.kept_results import DOCS, kept
 from windwrench.evidence.nanodrone_benchmark import WAYS, mean
 from windwrench.evidence.probabilities.calibration import figures, flights_of
@@ -19,6 +25,7 @@ RESULTS: Mapping[str, str] = {
     "nanodrone": "identify/nanodrone.json",
     "published": published.RESULTS,
     "unseen_flights": unseen_flights.RESULTS,
+    "simulated_vehicles": simulated_vehicles.RESULTS,
     "other_engines": other_engines.RESULTS,
     "probabilities": "results/probabilities.json.gz",
     "perfect_models": "results/perfect_models.json",
@@ -53,5 +60,6 @@ def page() -> dict[str, Any]:
         "band": poisson_band,
         "published": published,
         "unseen": unseen_flights,
+        "simulated": simulated_vehicles,
         "nowhere": NOWHERE,
     }

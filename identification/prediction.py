@@ -35,7 +35,7 @@ from .logs.table import Array, Rows, finite_rows
 from .motion.residual import loaded_model
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import known_pieces, log_signals, longest_step
-from .motion.smoothing import continuous, resampled, unbroken
+from .motion.smoothing import continuous, likeliest_speeds, resampled, unbroken
 
 Segments = Sequence[tuple[float, float]]
 
@@ -77,8 +77,10 @@ def predict(
 
     The model starts at a row from position, velocity, attitude and angular velocity. From then on
     only the logged rotor speeds and voltage enter; a rotor speed holds over the interval before its
-    sample. Rotors and effects start with the memory of the flight before. Rows before the start
-    tell the thrust of commands along body axes. Declared sensing effects are taken out of the log.
+    sample. White noise of measured speeds is taken out by ``likeliest_speeds``, with the speeds
+    some hundredths of a second later. Rotors and effects start with the memory of the flight
+    before. Rows before the start tell the thrust of commands along body axes. Declared sensing
+    effects are taken out of the log.
     No row after a start changes its state.
 
     A torque that held-out flights refuted (``vehicle.status``) leaves the body rate as at the
@@ -117,9 +119,16 @@ def predict(
         ]
     )
     starts = starts[finite_rows(states[starts])]
-    x = _flown(log, vehicle, states, starts, ahead)
+    x = _flown(_without_noise(log), vehicle, states, starts, ahead)
     parts = POSITION, VELOCITY, QUATERNION, RATE
     return Prediction(starts, log.period, *(x[..., part] for part in parts))
+
+
+def _without_noise(log: FlightLog) -> FlightLog:
+    """Return the log with the likeliest speeds behind measured ones: noise turns a calm flight."""
+    if log.commanded or not np.isfinite(log.rotor_speeds).all():
+        return log
+    return replace(log, rotor_speeds=likeliest_speeds(log.rotor_speeds, log.period))
 
 
 def _checked(log: FlightLog, state: ArrayLike) -> Array:
@@ -283,7 +292,7 @@ def errors_at(
 class LoggedStarts(NamedTuple):
     """n starts of predictions in a log, and the flight at the m samples after each."""
 
-    log: FlightLog  # without declared sensing effects
+    log: FlightLog  # without declared sensing effects and the speeds' noise
     states: Array  # (N, STATE) at each row of the log
     rows: Rows  # (n,) the starts'
     segment: Rows  # (n,) number of the segment with each start
@@ -349,7 +358,7 @@ def logged_starts(
     rows = np.concatenate(starts)
     begins = [t0 for t0, _ in segments]
     segment = np.searchsorted(begins, log.t[rows] + log.period, side="right") - 1
-    return LoggedStarts(log, states, rows, segment, np.concatenate(seen))
+    return LoggedStarts(_without_noise(log), states, rows, segment, np.concatenate(seen))
 
 
 def _off_ground(log: FlightLog, vehicle: Vehicle, states: Array) -> Mask:

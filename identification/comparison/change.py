@@ -7,7 +7,7 @@ battery acts on the total, too. A rotor's thrust for a request follows a power o
 power depends on the motor controllers, and on whether the firmware makes up for the battery. A
 difference of voltage therefore makes the total less certain.
 
-Possible changes, each by an amount that is integrated over:
+Possible changes, each by any amount (integrated out):
 
 * nothing;
 * a rotor delivers less than before for the same command (a cut propeller, a weak motor): its own
@@ -32,18 +32,16 @@ from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from ..logs.table import ArrayPair
 from .sessions import difference
-from .trim import Trim, features_of
+from .trim import FEATURES, Trim, features_of
 
 NOWHERE = "nowhere"
 SOMETHING_ELSE = "something else"
-# unit vectors to the left and the front
-_ROTORS = {
+# places, rotors first: unit vectors to the left and the front
+_PLACES = {
     "rotor 1 (front-left)": (1.0, 1.0),
     "rotor 2 (rear-left)": (1.0, -1.0),
     "rotor 3 (rear-right)": (-1.0, -1.0),
     "rotor 4 (front-right)": (-1.0, 1.0),
-}
-_SIDES = {
     "left": (1.0, 0.0),
     "rear": (0.0, -1.0),
     "right": (-1.0, 0.0),
@@ -53,8 +51,8 @@ _SIDES = {
 # prior probabilities by place and kind: a comparison has a reason, and all ten places are alike
 _CHANGES = {
     (NOWHERE, ""): 0.4,
-    **{(rotor, kind): 0.03 for rotor in _ROTORS for kind in ("weaker", "carries more")},
-    **{(place, "carries more"): 0.06 for place in _SIDES},
+    **{(place, "weaker"): 0.03 for place in _PLACES if "rotor " in place},
+    **{(place, "carries more"): 0.03 if "rotor " in place else 0.06 for place in _PLACES},
     (SOMETHING_ELSE, ""): 0.06,
 }
 
@@ -76,27 +74,19 @@ SURE = 0.95  # least probability of a place named without a doubt
 class Change(NamedTuple):
     """The change from the flights ``before`` to the flights ``after``."""
 
-    before: Sequence[Trim]
-    after: Sequence[Trim]
-    difference: Array  # (4,) left - right, front - rear, diagonals, logarithm of the total
-    std: Array  # (4,) deviation of the difference, if nothing changed
-    # probabilities of "nowhere", each rotor, each side, "all rotors" and "something else"; sum: 1
-    places: dict[str, float]
-    # probabilities of either kind at the likeliest place, if a rotor: weaker, or a weight there
+    # "nowhere", each rotor, each side, "all rotors" and "something else"; sum: 1
+    probabilities: dict[str, float]
+    place: str  # the likeliest
+    sure: bool  # at least ``SURE``
+    # probabilities of either kind there, if a rotor: weaker, or a weight
     weaker: float
     carries_more: float
     amount: float  # share of one rotor's thrust, or of the weight: mean, given place and kind
     amount_std: float
-
-    @property
-    def place(self) -> str:
-        """The likeliest place."""
-        return max(self.places, key=self.places.__getitem__)
-
-    @property
-    def sure(self) -> bool:
-        """Whether the likeliest place is sure."""
-        return self.places[self.place] >= SURE
+    difference: dict[str, float]  # by ``FEATURES``
+    difference_std_if_unchanged: dict[str, float]
+    before: Sequence[Trim]
+    after: Sequence[Trim]
 
 
 def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
@@ -111,39 +101,41 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     """
     if not (after and before):
         raise InputError("compare: expected at least one flight in each of the two sets")
-    ways = difference(after, before)
-    unchanged = ways.variance
+    mean, unchanged, ways = difference(after, before)
     # a correction of the total by the voltage would hide a change: a heavier vehicle draws more and
     # pulls its battery down
     late, early = (np.log([trim.voltage for trim in group]).mean() for group in (after, before))
     unchanged[:, 3] += (_VOLTAGE_POWER * np.nan_to_num(late - early)) ** 2
-    shares = np.mean([trim.thrust / trim.thrust.sum() for trim in before], axis=0)
-    prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
-    # log posterior, and mean and deviation of the amount; keys: place and kind
-    found = {}
+    shares = np.mean([trim.thrust_share for trim in before], axis=0)
+    logs = []
     for (place, kind), chance in _CHANGES.items():
         means, spread = _moved(place, kind, shares)
         variance = unchanged[:, None] + spread**2
-        off = np.square(ways.mean[:, None] - means) / variance + np.log(2.0 * np.pi * variance)
-        every = logsumexp(ways.log[:, None] - 0.5 * off.sum(axis=2), axis=0) + prior
-        weights, amounts = softmax(every), _AMOUNTS * (place != NOWHERE)
-        middle = amounts @ weights
-        std = math.sqrt(np.square(amounts - middle) @ weights)
-        found[place, kind] = logsumexp(every) + math.log(chance), middle, std
-    chances = dict(zip(found, softmax([log for log, *_ in found.values()]).tolist(), strict=True))
-    places = {place: sum(p for (at, _), p in chances.items() if at == place) for place, _ in found}
-    likeliest = max(places, key=places.__getitem__)
-    kinds = {kind: p / places[likeliest] for (at, kind), p in chances.items() if at == likeliest}
-    likely = np.exp(ways.log)
+        off = np.square(mean[:, None] - means) / variance + np.log(variance)
+        logs.append(logsumexp(ways[:, None] - 0.5 * off.sum(axis=2), axis=0) + math.log(chance))
+    prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
+    chances = softmax(np.array(logs) + prior)  # each change by each amount
+    at, kinds = np.array([*_CHANGES]).T
+    places = {place: float(chances[at == place].sum()) for place in at.tolist()}
+    place = max(places, key=places.__getitem__)
+    weaker, carries_more = (
+        float(chances[(at == place) & (kinds == kind)].sum()) / places[place]
+        for kind in ("weaker", "carries more")
+    )
+    amounts, weights = _AMOUNTS * (place != NOWHERE), max(chances[at == place], key=np.sum)
+    amount = np.average(amounts, weights=weights)
     return Change(
+        places,
+        place,
+        places[place] >= SURE,
+        weaker,
+        carries_more,
+        amount,
+        math.sqrt(np.average(np.square(amounts - amount), weights=weights)),
+        dict(zip(FEATURES, np.exp(ways) @ mean, strict=True)),
+        dict(zip(FEATURES, np.sqrt(np.exp(ways) @ unchanged), strict=True)),
         before,
         after,
-        likely @ ways.mean,
-        np.sqrt(likely @ unchanged),
-        places,
-        kinds.get("weaker", 0.0),
-        kinds.get("carries more", 0.0),
-        *found[likeliest, max(kinds, key=kinds.__getitem__)][1:],
     )
 
 
@@ -152,13 +144,13 @@ def _moved(place: str, kind: str, shares: Array) -> ArrayPair:
     beside the scatter: (a, 4), or one for all four.
     """
     amounts = _AMOUNTS[:, None]
+    if not kind:
+        return np.zeros(4), amounts * (place == SOMETHING_ELSE)
     if kind == "weaker":
-        lost = np.minimum(amounts, 0.9) * (np.arange(4) == list(_ROTORS).index(place))
+        lost = np.minimum(amounts, 0.9) * (np.arange(4) == [*_PLACES].index(place))
         means = features_of(shares / (1.0 - lost)) - features_of(shares)
-    elif kind:
-        # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there
-        way = amounts / (1.0 + amounts) * [*{**_ROTORS, **_SIDES}[place], 0.0]
-        means = np.hstack([way, np.log1p(amounts)])
     else:
-        return np.zeros((1, 4)), amounts * (place == SOMETHING_ELSE)
+        # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there
+        way = amounts / (1.0 + amounts) * [*_PLACES[place], 0.0]
+        means = np.hstack([way, np.log1p(amounts)])
     return means, np.linalg.norm(means, axis=1, keepdims=True) * _BEND

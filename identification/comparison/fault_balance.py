@@ -17,74 +17,28 @@ jumps in linear systems*, IEEE Transactions on Automatic Control 21, 1976).
 """
 
 import math
+from functools import partial
 from operator import itemgetter
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ...runtime.arrays import Array, Index, Mask
-from .fault_channels import STEP, Samples
+from ...runtime.arrays import Array, Mask
+from ..logs.table import Pair
+from .fault_channels import ORDER, STEP, Samples
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
-_SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
+SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
 BEFORE, AFTER = 25, 4  # least intervals of usual flight before a fault, and after one
-PARTS = (0.0, 0.25, 0.5, 0.75)  # starts of a fault within an interval
+# starts of a loss within an interval: at once (a broken propeller), or as the rotors' speed falls
+# (a motor)
+STARTS = np.tile([0.0, 0.25, 0.5, 0.75], 2)
+_AT_ONCE = 1e-9  # s, a lag
 _AROUND = 5  # intervals around a strong acceleration: the model may be as wrong there
-ORDER = 10
 SHARES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # activity over the quiet level, tried in turn
 _TURNING = 0.1  # activity per (rad/s)^2: the model's error while the vehicle turns
-
-
-class Noise(NamedTuple):
-    """Weights and whitening filter of one channel (N samples)."""
-
-    scale: Array  # (N,) relative standard deviation
-    filter: Array  # (p + 1,) the autoregression's, first 1
-    whole: Mask  # (N,) the p samples before are there, without a gap
-    variance: float  # fitted innovations
-
-    def whiten(self, values: Array) -> Array:
-        """Return innovations (n, ...) of values (N, ...), at the rows ``whole``."""
-        return self.filtered(values)[self.whole]
-
-    def filtered(self, values: Array) -> Array:
-        """Return the filter's output (N, ...); rows outside ``whole`` mean nothing."""
-        from scipy.signal import lfilter  # as late as can be: it takes .6 s
-
-        return np.asarray(lfilter(self.filter, 1.0, (values.T / self.scale).T, axis=0))
-
-    def log_likelihood(self, rest: Array | float) -> Array:
-        """Return the log-likelihood of innovations with ``rest`` as the sum of squares, at the best
-        variance.
-        """
-        n = self.whole.sum()
-        log_scale = np.log(self.scale[self.whole]).sum()
-        return np.asarray(-0.5 * n * np.log(np.maximum(rest, 1e-300) / n) - log_scale)
-
-
-def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
-    """Fit the noise to a residual.
-
-    Args:
-        residual: (N,).
-        activity: (N,) relative deviation of the rotors from the mean.
-        follows: (N,) the sample before is there.
-    """
-    whole = np.convolve(follows, np.ones(ORDER))[: len(follows)] == ORDER
-    whole[:ORDER] = False
-    tried = []
-    for share in SHARES:
-        scale = np.hypot(1.0, share * activity)
-        windows = sliding_window_view(residual / scale, ORDER + 1)[whole[ORDER:], ::-1]
-        present, past = windows[:, 0], windows[:, 1:]
-        # a ridge keeps the filter tame where a residual is next to nothing
-        gram = past.T @ past + 1e-6 * (present @ present) * np.eye(ORDER)
-        poles = np.linalg.solve(gram, past.T @ present)
-        rest = np.square(present - past @ poles).sum()
-        noise = Noise(scale, np.append(1.0, -poles), whole, rest / len(present))
-        tried.append((noise.log_likelihood(rest), noise))
-    return max(tried, key=itemgetter(0))[1]
+_RIDGE = 1e-6  # keeps the filter tame where a residual is next to nothing
 
 
 class FaultBalance:
@@ -92,140 +46,157 @@ class FaultBalance:
     beside the likeliest jump.
 
     Attributes:
-        nothing, log: log-likelihoods of no jump, and of the likeliest.
+        curve: bend and dead zone of the rotors.
+        thrust: relative thrusts (N, 4).
+        channels: the four.
+        rows: possible starts of a jump.
+        ramps: elapsed shares (R, J) of a loss in its first intervals, by ``STARTS``; 1 afterwards.
         share: elapsed share (N,) of the likeliest jump.
-        rows: possible starts of a fault.
-        ramps: elapsed shares (J,) of a loss in each interval; 1 afterwards. A loss begins within an
-            interval, at once (a propeller that breaks) or as the rotors' speed falls (a motor).
+        nothing, log: log-likelihoods of no jump, and of the likeliest.
     """
 
-    def __init__(self, samples: Samples, lag: float, bend: float, dead: float) -> None:
+    def __init__(self, samples: Samples, lag: float, curve: Pair) -> None:
         from scipy.ndimage import maximum_filter1d  # as late as can be: it takes .1 s
 
-        w = samples.angular_velocity
-        turning = samples.angular_acceleration
-        self.rows = np.arange(BEFORE, len(w) - AFTER)
-        self.thrust = thrust = samples.thrust(lag, bend, dead)  # (N, 4)
-        self.ramps = [_ramp(part, late) for late in (0.0, lag) for part in PARTS]
-        gyroscopic = np.roll(w, -1, axis=1) * np.roll(w, 1, axis=1)
-        free = [[np.ones(len(w)), *own] for own in zip(w.T, gyroscopic.T, strict=True)]
+        w, turning = samples.angular_velocity.T, samples.angular_acceleration.T
+        count = w.shape[1]
+        self.curve = curve
+        self.rows = slice(BEFORE, count - AFTER)
+        self.ramps = _ramps(lag)
+        self.thrust = thrust = samples.thrust(lag, *curve)
+        # free columns: a bias, damping and the gyroscopic moment
+        free = [[np.ones(count), w[i], w[i - 2] * w[i - 1]] for i in range(3)]
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
-        free[2].extend(turning.T[:2])
-        free.append([])
-        # each channel's measurement, moment and free columns
-        columns = [
-            np.column_stack([y, thrust @ signs, *own])
-            for y, signs, own in zip(
-                [*turning.T, samples.specific_force], _SIGNS, free, strict=True
-            )
-        ]
+        free[2].extend(turning[:2])
+        # each channel's moment, free columns and measurement
+        parts = zip(SIGNS, [*free, []], [*turning, samples.specific_force], strict=True)
+        columns = [np.array([thrust @ signs, *own, y]) for signs, own, y in parts]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
-        away += _TURNING * np.square(w).sum(axis=1) + samples.between
+        away += _TURNING * np.square(w).sum(axis=0) + samples.between
         # at the start of a fault the error of its shape grows with the acceleration
-        strong = maximum_filter1d(np.linalg.norm(turning[:, :2], axis=1), _AROUND)
+        strong = maximum_filter1d(np.linalg.norm(turning[:2], axis=0), _AROUND)
         away += strong / max(strong.max(), 1e-300)
-        # a rotor late by an interval is wrong there too
-        activity = np.maximum(away, np.append(away[:1], away[:-1]))
+        activity = maximum_filter1d(away, 2)  # a rotor late by an interval is wrong there too
         step: list[Array] = []  # none, and then the likeliest jump beside the noise
         nothing: list[float] = []
-        self.channels: list[_BalanceChannel] = []
         for _ in range(3):
-            self.channels = [_BalanceChannel(x, activity, samples.follows, *step) for x in columns]
+            self.channels = [_BalanceChannel(x, activity, samples.whole, *step) for x in columns]
             nothing.append(sum(channel.nothing for channel in self.channels))
-            self.log, self.share = self._jump()
+            k = BEFORE + int(np.argmax(self.steps(self.rows, self.ramps[:1])))
+            begin = max(k - 2, BEFORE)
+            logs = self.steps(slice(begin, min(k + 3, self.rows.stop)), self.ramps)
+            self.log = logs.max()
+            ramp, more = np.unravel_index(np.argmax(logs), logs.shape)
+            share = np.concatenate([np.zeros(begin + more), self.ramps[ramp], np.ones(count)])
+            self.share = share[:count]
             step = [self.share]
         self.nothing = max(nothing[0], nothing[-1])
 
-    def _jump(self) -> tuple[float, Array]:
-        """Return log-likelihood and elapsed share (N,) of the likeliest jump."""
-        k = int(np.argmax(self.steps(self.rows, self.ramps[:1])))
-        around = self.rows[max(k - 2, 0) : k + 3]
-        logs = self.steps(around, self.ramps)
-        ramp, k = divmod(int(np.argmax(logs)), len(around))
-        count = len(self.thrust)
-        share = np.concatenate([np.zeros(around[k]), self.ramps[ramp], np.ones(count)])[:count]
-        return logs[ramp, k], share
-
-    def steps(self, rows: Index, ramps: list[Array]) -> Array:
+    def steps(self, rows: slice, ramps: Array) -> Array:
         """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
         return np.array([sum(c.steps(rows, ramp) for c in self.channels) for ramp in ramps])
 
-    def lost(self, rotor: int) -> Array:
-        """Return each channel's loss (N, 4) if rotor 0 to 3 goes as the likeliest jump does."""
-        return (self.thrust[:, rotor] * self.share)[:, None] * _SIGNS[:, rotor]
 
-
-def _ramp(part: float, lag: float) -> Array:
-    """Return a loss from an elapsed ``part`` of the first interval on, by a lag (s)."""
-    since = np.maximum(STEP * (np.arange(2 + math.ceil(4.0 * lag / STEP)) - part), 0.0)
+def _ramps(lag: float) -> Array:
+    """Return the elapsed shares of a loss; see ``FaultBalance``."""
+    lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], 4)[:, None]
+    elapsed = np.arange(2 + math.ceil(4.0 * lag / STEP)) - STARTS[:, None]
+    since = STEP * np.maximum(elapsed, 0.0)
     # integral of 1 - exp(-since / lag)
-    area = since + lag * np.expm1(-since / lag) if lag > 0.0 else since
-    return np.asarray(np.diff(area) / STEP)
+    return np.asarray(np.diff(since + lags * np.expm1(-since / lags)) / STEP)
 
 
 class _BalanceChannel:
-    """Innovations of a channel's measurement and moment, the free columns projected out."""
+    """A channel's moment, free columns and measurement as innovations of the noise.
 
-    def __init__(self, columns: Array, activity: Array, follows: Mask, *step: Array) -> None:
-        y = columns[:, 0]
-        x = np.column_stack([columns[:, 1:], *step])
-        residual = y - x @ (beta := np.linalg.lstsq(x, y, rcond=None)[0])
-        if beta[0] <= 0.0:  # a moment with a negative factor is left out
-            residual = y - x[:, 1:] @ np.linalg.lstsq(x[:, 1:], y, rcond=None)[0]
-        self.noise = noise = fit_noise(residual, activity, follows)
-        self.white = noise.whiten(columns)
-        self.basis = np.linalg.qr(self.white[:, 2:])[0]
-        both = self.white[:, :2]
-        self.both = both - self.basis @ (self.basis.T @ both)
-        (yy, self.my), (_, mm) = (self.both.T @ self.both).tolist()
-        self.mm = max(mm, 1e-300)
-        # sum of squares where nothing happens, and its log-likelihood
-        self.rest = yy - max(self.my, 0.0) / self.mm * self.my
-        self.nothing = float(noise.log_likelihood(self.rest))
+    Args:
+        columns: (c, N) these, in this order.
+        activity: (N,) relative deviation of the rotors from the mean.
+        whole: (N,) the ``ORDER`` samples before are there, without a gap.
+        step: further columns (N,) in the fit of the noise.
+    """
+
+    def __init__(self, columns: Array, activity: Array, whole: Mask, *step: Array) -> None:
+        from scipy.signal import lfilter  # as late as can be: it takes .6 s
+
+        y, x = columns[-1], np.vstack([columns[:-1], *step])
+        moment = np.linalg.lstsq(x.T, y, rcond=None)[0][0]
+        x = x[int(moment <= 0.0) :]  # a moment with a negative factor is left out
+        residual = y - np.linalg.lstsq(x.T, y, rcond=None)[0] @ x
+        weights = 1.0 / np.hypot(1.0, np.outer(SHARES, activity))
+        fits = [_fit_noise(residual, weight, whole) for weight in weights]
+        _, self.variance, whitener, self.weight = max(fits, key=itemgetter(0))
+        self.filtered, self.whole = partial(lfilter, whitener, 1.0), whole
+        self.white = self._innovations(columns)
+        directions, r = np.linalg.qr(self.white.T)
+        # the last direction is the measurement, less all columns
+        directions[:, -1] *= r[-1, -1]
+        self.rest = r[-1, -1] ** 2
+        self.nothing = _log_likelihood(self.rest, self.weight[whole])
+        # products of an impulse in each row with all directions: the filter runs backwards. A step
+        # is a row of impulses. Behind them the sum of squares of a step since ever
+        products = self.filtered(directions.T[:, ::-1]) * self.weight[::-1]
+        squares = np.square(self._innovations(np.ones(len(whole))))[::-1]
+        sums = np.vstack([products, squares]).cumsum(axis=1)[:, ::-1]
+        self.from_row_on = np.vstack([sums, self.weight, whole])
+
+    def _innovations(self, values: Array) -> Array:
+        """Return the innovations (..., N) of values; zero outside ``whole``."""
+        return np.asarray(self.filtered(values * self.weight) * self.whole)
 
     def part(self, column: Array) -> tuple[float, float]:
         """Return the ratio, negative, of the factors of a column (N,) and of the moment, and its
         standard deviation: infinite where the channel does not follow the commands.
         """
-        y = self.white[:, 0]
-        x = np.insert(self.white[:, 1:], 1, self.noise.whiten(column), axis=1)
-        beta = np.linalg.lstsq(x, y, rcond=None)[0]
-        left = y - x @ beta
-        covariance = np.linalg.pinv(x.T @ x) * (left @ left) / max(1, len(y) - len(beta))
-        a, b = beta[:2].tolist()
-        if a <= 2.0 * math.sqrt(covariance[0, 0]):
+        x, y = np.vstack([self._innovations(column), self.white[:-1]]), self.white[-1]
+        inverse = np.linalg.pinv(x)
+        factor, moment = (beta := y @ inverse)[:2].tolist()
+        noise = np.linalg.norm(y - beta @ x) / math.sqrt(self.whole.sum() - len(beta))
+        if moment <= 2.0 * noise * np.linalg.norm(inverse[:, 1]):
             return 0.0, math.inf
-        slope = np.array([b / a**2, -1.0 / a])
-        return -b / a, math.sqrt(max(slope @ covariance[:2, :2] @ slope, 1e-12))
+        ratio = factor / moment
+        spread = np.linalg.norm(inverse[:, 0] - ratio * inverse[:, 1])
+        return -ratio, float(noise * spread / moment)
 
-    def steps(self, rows: Index, ramp: Array) -> Array:
+    def steps(self, rows: slice, ramp: Array) -> Array:
         """Return the log-likelihoods (K,) of a step beginning at each of ``rows`` by a ramp.
 
         The size is the best one, at the price of a normal prior: as wide as this size, or as wide
         as a single sample's if wider.
         """
-        from scipy.signal import lfilter  # as late as can be: it takes .6 s
+        # until a share of 1 fills the filter's memory
+        begun = np.append(ramp, np.ones(ORDER + 1))
+        padded = np.pad(self.from_row_on, [(0, 0), (0, len(begun))])
+        windows = sliding_window_view(padded, len(begun), axis=1)[:, rows]
+        *known, own = windows[:-3] @ np.diff(begun, prepend=0.0)
+        squares, weight, whole = windows[-3:]
+        outputs = whole * self.filtered(begun * weight)
+        square = np.square(outputs[:, :-1]).sum(axis=1) + squares[:, -1]
+        left = square - np.square(known).sum(axis=0)
+        gain = np.square(own) / np.maximum(left, 1e-12 * square + 1e-300)
+        width = 1.0 + np.log(np.maximum(gain / self.variance, 1.0))
+        price = 0.5 * np.maximum(width, math.log(self.whole.sum()))
+        return np.asarray(_log_likelihood(self.rest - gain, self.weight[self.whole]) - price)
 
-        noise = self.noise
-        # products of an impulse in each row with y, the moment and the basis
-        against = np.zeros((len(noise.whole), 2 + self.basis.shape[1]))
-        against[noise.whole] = np.column_stack([self.both, self.basis])
-        impulse = lfilter(noise.filter, 1.0, against[::-1], axis=0) / noise.scale[::-1, None]
-        # a step is a row of impulses
-        growth = np.diff(ramp, prepend=0.0, append=1.0)
-        sums = lfilter(growth, [1.0, -1.0], impulse, axis=0)[::-1][rows]
-        sy, sm = sums[:, :2].T
-        # its square: first outputs of the filter during the ramp, and later ones of a share of 1
-        pad = 0, len(noise.filter) - 1 + len(ramp)
-        at = rows[:, None] + np.arange(pad[1])
-        begun = 1.0 / np.pad(noise.scale, pad, constant_values=np.inf)[at]
-        begun[:, : len(ramp)] *= ramp
-        first = lfilter(noise.filter, 1.0, begun) * np.pad(noise.whole, pad)[at]
-        later = np.square(noise.whole * noise.filtered(np.ones(len(noise.whole))))
-        ss = np.pad(np.cumsum(later[::-1])[::-1], pad)[rows + pad[1]]
-        ss += np.square(first).sum(axis=1) - np.square(sums[:, 2:]).sum(axis=1)
-        own_share = np.maximum(ss - sm * sm / self.mm, 1e-12 * ss + 1e-300)
-        gain = np.square(sy - sm * self.my / self.mm) / own_share
-        width = 1.0 + np.log(np.maximum(gain / noise.variance, 1.0))
-        price = 0.5 * np.maximum(width, math.log(noise.whole.sum()))
-        return np.asarray(noise.log_likelihood(self.rest - gain) - price)
+
+def _fit_noise(residual: Array, weight: Array, whole: Mask) -> tuple[Any, float, Array, Array]:
+    """Fit an autoregression to a residual (N,) with weights (N,).
+
+    Returns:
+        The log-likelihood, the variance of the innovations, the filter (p + 1,) with them as its
+        output, and the weights.
+    """
+    windows = sliding_window_view(residual * weight, ORDER + 1)[whole[ORDER:], ::-1]
+    gram = windows.T @ windows
+    ridge = _RIDGE * gram[0, 0] * np.eye(ORDER)
+    poles = np.linalg.solve(gram[1:, 1:] + ridge, gram[1:, 0])
+    rest = np.square(windows @ (whitener := np.append(1.0, -poles))).sum()
+    return _log_likelihood(rest, weight[whole]), rest / len(windows), whitener, weight
+
+
+def _log_likelihood(rest: Any, weight: Array) -> Any:
+    """Return the log-likelihood of innovations of ``weight`` (n,) with ``rest`` as the sum of
+    squares, at the best variance.
+    """
+    n = len(weight)
+    return np.log(weight).sum() - 0.5 * n * np.log(np.maximum(rest, 1e-300) / n)

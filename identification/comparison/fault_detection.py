@@ -12,23 +12,25 @@ quadrotor with one rotor in each quadrant. Two questions are asked apart:
 """
 
 import math
-from collections.abc import Iterable
-from typing import NamedTuple
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax, logsumexp, softmax
 
 from ...runtime.arrays import Array
 from ..logs.table import ArrayPair
-from .fault_balance import PARTS, FaultBalance
-from .fault_channels import STEP, Channels, Samples, sample
+from .change import SURE
+from .fault_balance import SIGNS, STARTS, FaultBalance
+from .fault_channels import STEP, Samples
 
 NOTHING, ALL, OTHER = "nothing", "all rotors", "another force or torque"
-Interval = tuple[float, float, float]  # middle, low and high; of a trial: lag, bend and dead zone
+ROTORS = ("rotor 1", "rotor 2", "rotor 3", "rotor 4")
 
 _LOSSES = np.linspace(0.05, 1.0, 39)  # tried shares of a rotor's thrust
 _ALL_LOSE = 0.5  # the largest share tried for all rotors together
 _LAGS = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
+_USUAL_LAG = 0.05  # s, beside each of the curves
 # curves of thrust against command: the square's share, and the dead zone in parts of the
 # median command
 _CURVES = ((0.0, 0.0), (0.2, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.3), (1.0, 0.3))
@@ -40,114 +42,100 @@ _ERROR = 0.25
 # standard deviation of a jump without a rotor, about x, y, z and along z, in parts of one rotor's
 # usual torque and force there: the loss of a load of a third of the weight
 _OTHER = (0.5, 0.5, 0.5, 1.3)
-_SURE = 0.95  # least probability of a fault named without a doubt
 
 
 class RotorFault(NamedTuple):
-    """The result of a search in one flight."""
+    """The result of a search in one flight; of no rotor, the last six are None."""
 
     samples: Samples
-    # "nothing", rotors "1" to "4", "all rotors" and "another force or torque"; sum: 1
-    probabilities: dict[str, float]
-    # the likeliest rotor; onset as median, thrust as mean, each with a 95 % interval
-    rotor: int
-    onset: Interval  # s, on the log's clock
-    remaining: Interval  # remaining share of thrust
-
-    @property
-    def seconds(self) -> float:
-        """Seconds of the flight in the search."""
-        return len(self.samples.t) * STEP
-
-    @property
-    def likeliest(self) -> str:
-        """The likeliest of ``probabilities``."""
-        return max(self.probabilities, key=self.probabilities.__getitem__)
-
-    @property
-    def sure(self) -> bool:
-        """Whether the likeliest is sure."""
-        return self.probabilities[self.likeliest] >= _SURE
+    log: str  # its name
+    flight_s: float
+    ended_because: str | None  # reason for the end of the search; None: the log's end
+    probabilities: dict[str, float]  # nothing, each rotor, all rotors, and another cause; sum: 1
+    found: str  # the likeliest
+    sure: bool  # at least ``SURE``
+    rotor: int | None = None  # 1 to 4
+    motor: str | None = None  # the log's own name
+    # onset as median, share of thrust as mean, each with a 95 % interval
+    onset_s: Any = None  # on the log's clock
+    onset_ci95_s: Any = None
+    remaining: Any = None
+    remaining_ci95: Any = None
 
 
-def find_fault(channels: Channels) -> RotorFault:
-    """Look for a rotor that lost thrust during a flight.
-
-    Raises:
-        InputError: too little flight.
-    """
-    samples = sample(channels)
-    tried = _search(samples, channels.thrust_known)
-    best = max(tried, key=lambda one: one.log)
-    # a jump at each row, by each ramp
+def find_fault(samples: Samples) -> RotorFault:
+    """Look for a rotor that lost thrust during a flight."""
+    tried = [FaultBalance(samples, _USUAL_LAG, curve) for curve in _CURVES]
+    curve = max(tried, key=attrgetter("log")).curve
+    tried += [FaultBalance(samples, lag, curve) for lag in _LAGS]
+    best = max(tried, key=attrgetter("log"))
     jumps = best.steps(best.rows, best.ramps)
-    starts = np.add.outer(STEP * (np.tile(PARTS, 2) - 0.5), samples.t[best.rows])
-    evidence = logsumexp(jumps) - math.log(len(best.ramps) * len(samples.t))
     each, weights = _patterns(best)
     logs = np.log(_EVENTS) + each
     # the search, with free sizes, gives the likelihood of an event of any kind
+    event = logsumexp(jumps) + math.log(sum(_EVENTS) / (len(jumps) * len(samples.t)))
     nothing = math.log(_NOTHING) + max(one.nothing for one in tried)
-    chances = softmax(np.append(nothing, evidence + math.log(sum(_EVENTS)) + log_softmax(logs)))
-    rotor = int(np.argmax(logs[:4]))
-    _, least, most = _quantiles(_LOSSES, weights[rotor], 0.5 * (_LOSSES[1] - _LOSSES[0]))
-    return RotorFault(
+    chances = softmax(np.append(nothing, event + log_softmax(logs)))
+    causes = dict(zip([NOTHING, *ROTORS, ALL, OTHER], chances.tolist(), strict=True))
+    found = max(causes, key=causes.__getitem__)
+    fault = RotorFault(
         samples,
-        dict(zip([NOTHING, "1", "2", "3", "4", ALL, OTHER], chances.tolist(), strict=True)),
-        1 + rotor,
-        _quantiles(starts.ravel(), softmax(jumps).ravel(), STEP),
-        (1.0 - weights[rotor] @ _LOSSES, max(0.0, 1.0 - most), min(1.0, 1.0 - least)),
+        samples.name,
+        len(samples.t) * STEP,
+        samples.ended,
+        causes,
+        found,
+        causes[found] >= SURE,
     )
-
-
-def _search(samples: Samples, thrust_known: bool) -> list[FaultBalance]:
-    """Return all trials: lags, and then curves, each from the best so far."""
-    tried = dict[Interval, FaultBalance]()
-
-    def best_of(keys: Iterable[Interval]) -> Interval:
-        for key in keys:
-            tried[key] = tried.get(key) or FaultBalance(samples, *key)
-        return max(tried, key=lambda key: tried[key].log)
-
-    curves = _CURVES[:1] if thrust_known else _CURVES
-    _, bend, dead = best_of((_LAGS[3], *curve) for curve in curves)
-    lag, *_ = best_of((lag, bend, dead) for lag in _LAGS)
-    best_of((lag, *curve) for curve in curves)
-    return list(tried.values())
+    if found not in ROTORS:
+        return fault
+    i = ROTORS.index(found)
+    starts = np.add.outer(STEP * (STARTS - 0.5), samples.t[best.rows])
+    onset, begin, end = _interval(starts.ravel(), softmax(jumps).ravel(), STEP)
+    margin = 0.5 * (_LOSSES[1] - _LOSSES[0])
+    _, least, most = _interval(1.0 - _LOSSES, weights[i], margin)
+    return fault._replace(
+        rotor=i + 1,
+        motor=samples.motor_names[i] if samples.motor_names else None,
+        onset_s=onset,
+        onset_ci95_s=(begin, end),
+        remaining=1.0 - weights[i] @ _LOSSES,
+        remaining_ci95=(max(0.0, least), min(1.0, most)),
+    )
 
 
 def _patterns(best: FaultBalance) -> ArrayPair:
     """Return the log-evidence (6,) of rotors 1 to 4, all rotors, and another force and torque; and
     the probabilities of ``_LOSSES`` for each rotor (4, E).
     """
-    from scipy.stats import norm  # as late as can be: it takes .6 s
-
     each = _LOSSES[:, None]
-    lost = each[_LOSSES <= _ALL_LOSE]
-
-    def seen(columns: Array) -> Array:
-        """Return the visible part (4,) of a column in each channel, and its deviation (4,)."""
-        pairs = zip(best.channels, columns.T, strict=True)
-        return np.array([channel.part(column) for channel, column in pairs]).T
-
-    # each channel's visible part, its standard deviation, and the hypothesis' means and spread
-    tried = [(*seen(best.lost(rotor)), each, _ERROR * each) for rotor in range(4)]
-    # a jump of each channel, in parts of one rotor's usual torque or force there
-    jumps = seen(np.tile(best.share[:, None], 4))
-    tried.append((*jumps, lost * [0.0, 0.0, 0.0, 4.0], _ERROR * lost * [2.0, 2.0, 2.0, 4.0]))
-    tried.append((*jumps, np.zeros((1, 1)), np.array(_OTHER)))
-    # channels finite under every hypothesis, so all hypotheses explain the same numbers
-    says = np.isfinite([std for _, std, *_ in tried]).all(axis=0)
-    logs = [
-        norm.logpdf(part, means, np.hypot(std, spread)).sum(axis=1, where=says)
-        for part, std, means, spread in tried
+    few = each[_LOSSES <= _ALL_LOSE]
+    jump = np.tile(best.share[:, None], 4)
+    # each cause's shape in the channels (N, 4), and by amount the means and standard deviations of
+    # its size there. A bare jump is in parts of one rotor's usual torque or force
+    causes = [
+        *((jump * best.thrust[:, [i]] * SIGNS[:, i], each, _ERROR * each) for i in range(4)),
+        (jump, few * [0.0, 0.0, 0.0, 4.0], _ERROR * few * [2.0, 2.0, 2.0, 4.0]),
+        (jump, np.zeros((1, 1)), np.array(_OTHER)),
     ]
+    sizes = [
+        np.transpose([c.part(x) for c, x in zip(best.channels, shape.T, strict=True)])
+        for shape, *_ in causes
+    ]
+    # channels finite under every hypothesis, so all hypotheses explain the same numbers
+    says = np.isfinite(sizes).all(axis=(0, 1))
+    logs = []
+    for (size, std), (_, means, spread) in zip(sizes, causes, strict=True):
+        variance = std**2 + spread**2
+        off = np.square(size - means) / variance + np.log(variance)
+        logs.append(-0.5 * off.sum(axis=1, where=says))
     evidence = [logsumexp(log) - math.log(len(log)) for log in logs]
     return np.array(evidence), softmax(logs[:4], axis=1)
 
 
-def _quantiles(values: Array, weight: Array, margin: float) -> Interval:
+def _interval(values: Array, weight: Array, margin: float) -> tuple[float, float, float]:
     """Return the median and the ends of a 95 % interval, widened by a step of the grid."""
     order = np.argsort(values, kind="stable")
-    at = np.searchsorted(np.cumsum(weight[order]), (0.025, 0.5, 0.975))
-    low, middle, high = values[order[np.minimum(at, len(order) - 1)]].tolist()
+    at = np.searchsorted(np.cumsum(weight[order]), (0.5, 0.025, 0.975))
+    middle, low, high = values[order[at]].tolist()
     return middle, low - margin, high + margin

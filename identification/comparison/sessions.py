@@ -12,12 +12,11 @@ scatter, at either level, is summed over likewise.
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_softmax
 
-from ...runtime.arrays import Array, Index, Mask
+from ...runtime.arrays import Array, Mask
 from .trim import Trim
 
 # Scatter of unchanged flights in the four numbers of a trim. Measured on 89 flights of one
@@ -41,80 +40,53 @@ _MOST_ENDS = 8  # possible ends of sessions: the largest differences between fli
 _LEAST_LOG = -12.0  # below the likeliest way; less likely ways do not count
 
 
-class _Difference(NamedTuple):
-    """The difference (4,) of two sets, if nothing but the vehicle changed between them: a normal
-    density for each of n ways (cuts into sessions and scales of the scatter).
+def difference(after: Sequence[Trim], before: Sequence[Trim]) -> tuple[Array, Array, Array]:
+    """Return the difference of two sets of flights, if nothing but the vehicle changed: mean and
+    variance (n, 4) of a normal density for each of the n likeliest ways (cuts into sessions and
+    scales of the scatter), and the ways' log-likelihood (n,), normalised.
+
+    Either set is in the order of time.
     """
+    flights = [*before, *after]
+    later = np.arange(len(flights)) >= len(before)
+    x = np.array([trim.features for trim in flights])
+    noise = np.square([trim.std for trim in flights])
+    scales = np.exp(2.0 * _SPREAD * _SCALES.T[..., None])
+    session, flight = scales * np.square([[SESSION_STD], [FLIGHT_STD]])  # (k, 4) variances
+    own = (flight[..., None] + noise.T)[..., None] * np.eye(len(x))  # (k, 4, n, n)
+    # the vehicle's mean, the difference, and the flights
+    columns = np.stack(np.broadcast_arrays(1.0, later, x.T), axis=-1)
+    ways = []
+    for same, log in _cuts(flights, later, x):
+        root = np.linalg.cholesky(own + session[..., None, None] * same)
+        # triangular, of independent errors: the vehicle's mean is integrated out
+        r = np.asarray(np.linalg.qr(np.linalg.solve(root, columns), mode="r"))
+        a, b = r[..., 0, 0], r[..., 1, 1]
+        size = np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=2) + np.log(np.abs(a * b))
+        left = size + 0.5 * np.square(r[..., 2:, 2]).sum(axis=2)
+        log = log - 0.5 * np.square(_SCALES).sum(axis=1) - left.sum(axis=1)
+        ways.append((r[..., 1, 2] / b, b**-2.0, log))
+    mean, variance, logs = map(np.concatenate, zip(*ways, strict=True))
+    keep = logs > logs.max() + _LEAST_LOG
+    return mean[keep], variance[keep], log_softmax(logs)[keep]
 
-    mean: Array  # (n, 4)
-    variance: Array  # (n, 4)
-    log: Array  # (n,) log-likelihood of the flights in this way, normalised
 
-
-def difference(after: Sequence[Trim], before: Sequence[Trim]) -> _Difference:
-    """Return the difference of two sets of flights in the likeliest ways; either set is in the
-    order of time.
+def _cuts(flights: Sequence[Trim], later: Mask, x: Array) -> Iterator[tuple[Mask, float]]:
+    """Yield each way to cut the flights into sessions: the pairs (n, n) of one session, and the
+    logarithm of its prior.
     """
-    # flights of one name stand together, behind those without a name
-    every = [*before, *after]
-    names = [trim.session for trim in every]
-    order = sorted(range(len(every)), key=lambda i: names.index(names[i]) if names[i] else -1)
-    trims = [every[i] for i in order]
-    later = np.array(order) >= len(before)
-    x = np.array([trim.features for trim in trims])
-    noise = np.array([trim.noise for trim in trims])
-    parts = (_of_cut(x, later, noise, cut, log) for cut, log in _cuts(trims, later, x))
-    mean, variance, log = map(np.concatenate, zip(*parts, strict=True))
-    log = log_softmax(log)
-    keep = log > log.max() + _LEAST_LOG
-    return _Difference(mean[keep], variance[keep], log[keep])
-
-
-def _cuts(trims: Sequence[Trim], later: Mask, x: Array) -> Iterator[tuple[Index, float]]:
-    """Yield each way to cut the flights into sessions: the number of each flight's session, and
-    the logarithm of its prior.
-    """
-    apart = np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
-    volts = np.array([trim.voltage for trim in trims])
+    names = np.array([trim.session for trim in flights])
+    volts = np.array([trim.voltage for trim in flights])
+    told = (names[:, None] == names) & (names != "")
+    # between two flights without a name, of one set
+    unknown = (names[1:] == "") & (names[:-1] == "") & ~np.diff(later)
+    apart = unknown * np.abs(np.diff(x, axis=0) / SESSION_STD).sum(axis=1)
+    places = np.argsort(-apart, kind="stable")[: min(unknown.sum(), _MOST_ENDS)]
     rises = np.diff(volts) > _RISE * volts[:-1]  # False where one is not known
-    chance = np.where(rises, _ENDS_AT_RISE, _ENDS)
-    names = np.array([trim.session for trim in trims])
-    named = names != ""
-    told = named[1:] | named[:-1] | np.diff(later)
-    known = ~named[1:] | (names[1:] != names[:-1])
-    order = np.argsort(np.where(told, np.inf, -apart), kind="stable")
-    places = order[: min((~told).sum(), _MOST_ENDS)]
+    chance = np.where(rises, _ENDS_AT_RISE, _ENDS)[places]
     for chosen in itertools.product((False, True), repeat=len(places)):
-        ends = told & known
+        ends = ~unknown
         ends[places] = chosen
-        chances = np.where(ends, chance, 1.0 - chance)[places]
-        yield np.append(0, np.cumsum(ends)), np.log(chances).sum()
-
-
-def _of_cut(
-    x: Array, later: Mask, noise: Array, cut: Index, log: float
-) -> tuple[Array, Array, Array]:
-    """Return mean and variance (k, 4) of the difference, and the flights' log-likelihood (k,).
-
-    The difference is between flights (n, 4), ``later`` (n,) against earlier, at each pair of scales
-    of the scatter; the vehicle's mean is integrated out.
-    """
-    wider = np.exp(2.0 * _SPREAD * _SCALES.T[..., None])
-    session, flight = wider * np.square([[SESSION_STD], [FLIGHT_STD]])  # (k, 4) variances
-    prior = -0.5 * np.square(_SCALES).sum(axis=1)
-    weight = 1.0 / (flight[:, None] + noise)  # (k, n, 4)
-    of = np.eye(cut[-1] + 1)[cut]  # (n, sessions)
-    # products of the vehicle's mean, the difference, and the flights under the inverse covariance;
-    # flights of a session share its error (Woodbury)
-    parts = np.stack(np.broadcast_arrays(1.0, later[:, None], x))
-    sums = np.einsum("ns,knf,pnf->pksf", of, weight, parts)
-    shrink = session[:, None] / (1.0 + session[:, None] * sums[0])
-    (aa, ab, ax), (_, bb, bx), (*_, xx) = np.einsum(
-        "knf,pnf,qnf->pqkf", weight, parts, parts
-    ) - np.einsum("ksf,pksf,qksf->pqkf", shrink, sums, sums)
-    determinant = aa * bb - ab**2
-    mean = (aa * bx - ab * ax) / determinant
-    level = (bb * ax - ab * bx) / determinant
-    left = xx - level * ax - mean * bx + np.log(determinant) - np.log(weight).sum(axis=1)
-    left += np.log1p(session[:, None] * sums[0]).sum(axis=1)
-    return mean, aa / determinant, log + prior - 0.5 * left.sum(axis=1)
+        number = np.append(0, np.cumsum(ends))
+        same = told | (number[:, None] == number)
+        yield same, np.log(np.where(chosen, chance, 1.0 - chance)).sum()

@@ -31,6 +31,7 @@ EDGE = 1.5  # s after the rotors start and before they stop: taking off and land
 NEAR = 0.1  # of the median thrust: further off, the vehicle climbs, sinks or pulls
 _SMOOTH = 0.25  # s
 BATCH = 1.5  # s: the loop's answer to a gust is over
+FEATURES = ("left_less_right", "front_less_rear", "diagonals", "log_total")
 _MIX = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, 1.0], [1.0, -1.0, 1.0, -1.0]])
 
 
@@ -41,17 +42,18 @@ class Trim:
     Rotors are in this kit's order: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right.
     """
 
-    name: str
-    thrust: Array  # (4,)
+    log: str  # its name
     seconds: float  # length of the mean
-    noise: Array  # (4,) variance of ``features`` as means of one flight; zero: not known
+    thrust_share: Array  # (4,)
+    total: float
+    std: Array  # (4,) of ``features`` as means of one flight; zero: not known
     voltage: float = math.nan  # V, mean over the same time; NaN: not known
     session: str = ""  # common name of a session's flights; empty: not known
 
     @property
     def features(self) -> Array:
         """The four numbers, see ``features_of``."""
-        return features_of(self.thrust)
+        return features_of(self.thrust_share * self.total)
 
 
 def features_of(thrust: Array) -> Array:
@@ -64,93 +66,62 @@ def features_of(thrust: Array) -> Array:
     return np.concatenate([thrust @ _MIX.T / total, np.log(total)], axis=-1)
 
 
-def trim_of(name: str, t: Array, thrust: Array, steady: Mask, voltage: Array | None = None) -> Trim:
-    """Return the trim of a flight.
-
-    Args:
-        name: the flight's name.
-        t: (N,) s, increasing.
-        thrust: (N, 4), linear in thrust.
-        steady: (N,) rows of the mean.
-        voltage: (N,) V, battery.
+def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
+    """Return the trim of a log: thrust in N where rotor speeds are known, or a motor curve; else
+    the motor commands, taken as linear in thrust.
 
     Raises:
         InputError: fewer than 3 s count, or the rotors do not turn.
     """
-    step = np.diff(t, append=t[-1])
-    step = np.minimum(step, 5.0 * median_step(t))[steady]  # a gap is no flight
-    seconds = step.sum()
-    if seconds < LEAST_SECONDS:
+    name = log.source or log.name
+    if log.has_rotor_speeds or log.command is None:
+        thrust = np.square(log.rotor_speeds) * vehicle.k
+    elif vehicle.motor_curve is None:
+        thrust = log.command
+    else:
+        thrust = vehicle.commanded_thrust(log.command, log.voltage)
+    steady = _steady(log, thrust, vehicle)
+    step = np.minimum(np.diff(log.t, append=log.t[-1]), 5.0 * log.period)  # a gap is no flight
+    step, thrust = step[steady], thrust[steady]
+    if (seconds := step.sum()) < LEAST_SECONDS:
         raise InputError(
             f"{name}: {seconds:.3g} s of calm flight; expected at least {LEAST_SECONDS:g} s off "
             f"the ground and slower than {CALM:g} m/s, to compare how the rotors share the work"
         )
-    thrust = thrust[steady]
     mean = np.average(thrust, axis=0, weights=step)
     if not np.all((mean > 0.0) & (mean < np.inf)):
         raise InputError(
             f"{name}: mean thrusts of the rotors are {np.round(mean, 4).tolist()}; expected four "
             "positive numbers"
         )
-    known = np.empty(0) if voltage is None else voltage[steady]
-    known = known[(known > 0.0) & (known < np.inf)]
-    batches = np.cumsum(step) // BATCH == np.arange(seconds // BATCH + 1.0)[:, None]
+    batch = np.cumsum(step) // BATCH
+    batches = [batch == number for number in np.unique(batch)]
     # the last batch may be a short one
-    means = [thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() > 0.5 * BATCH]
-    numbers = [features_of(some) for some in means if some.min() > 0.0]
-    noise = np.var(numbers, axis=0, ddof=1) / len(numbers) if len(numbers) > 1 else np.zeros(4)
-    return Trim(name, mean, seconds, noise, known.mean() if known.size else math.nan)
+    means = [thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() >= 0.5 * BATCH]
+    std = np.std(features_of(np.array(means)), axis=0, ddof=1) / math.sqrt(len(means))
+    known = None if log.voltage is None else log.voltage[steady & (log.voltage > 0.0)]
+    voltage = math.nan if known is None or not known.size else known.mean()
+    return Trim(name, seconds, mean / mean.sum(), mean.sum(), std, voltage)
 
 
-def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
-    """Return the trim of a log: thrust in N where rotor speeds are known, or a motor curve; else
-    the motor commands, taken as linear in thrust.
-
-    Raises:
-        InputError: too little calm flight, or neither rotor speeds nor commands.
-    """
-    name = log.source or log.name
-    t = log.t
-    if log.has_rotor_speeds:
-        thrust = np.square(log.rotor_speeds) * vehicle.k
-    elif log.command is None:
-        raise InputError(f"{name}: no rotor speeds and no motor commands; expected one of them")
-    elif vehicle.motor_curve is not None:
-        thrust = vehicle.commanded_thrust(log.command, log.voltage)
-    else:
-        thrust = log.command
-    total = thrust.sum(axis=1)
-    steady = carrying(t, total)
-    if log.has_pose:
-        at = t[log.valid]
-        place = log.position[log.valid]
-        if len(at) < 3:
-            raise InputError(f"{name}: fewer than three poses; expected a flight")
-        speeds = log.rotor_speeds
-        if not log.has_rotor_speeds:  # scaled: usually the rotors carry the weight
-            newton = thrust * (vehicle.weight / usual_thrust(total))
-            speeds = np.sqrt(np.maximum(newton, 0.0) / vehicle.k)
-        phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
-        flown = [(t >= start) & (t <= end) for phase, start, end in phases if phase == FLIGHT]
-        speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
-        steady = np.any(flown, axis=0) & (np.interp(t, at, speed) < CALM)
-    return trim_of(name, t, thrust, steady, log.voltage)
-
-
-def carrying(t: Array, total: Array) -> Mask:
-    """Return the rows (N,) of steady flight, from the rotors' thrust alone.
-
-    Args:
-        t: (N,) s.
-        total: (N,) thrust of all rotors, in any unit.
-    """
-    smooth = _smooth(total, t)  # a single low sample is no landing
-    around = np.ones(1 + 2 * round(EDGE / median_step(t)))
-    # a log may begin and end in flight
-    steady = binary_erosion(flying(smooth), around, border_value=True)
-    if steady.any():
-        steady &= np.abs(smooth / np.median(total[steady]) - 1.0) < NEAR
-    return np.asarray(steady)
+def _steady(log: FlightLog, thrust: Array, vehicle: Vehicle) -> Mask:
+    """Return the rows (N,) of calm flight by the pose; without one, of thrust about the weight."""
+    t, total = log.t, thrust.sum(axis=1)
+    if log.valid.sum() < 3:
+        smooth = _smooth(total, t)  # a single low sample is no landing
+        around = np.ones(1 + 2 * round(EDGE / log.period))
+        # a log may begin and end in flight
+        steady = binary_erosion(flying(smooth), around, border_value=True)
+        level = np.median(total[steady]) if steady.any() else np.inf
+        return np.asarray(steady & (np.abs(smooth / level - 1.0) < NEAR))
+    at, place = t[log.valid], log.position[log.valid]
+    # scaled: usually the rotors carry the weight
+    newton = thrust * (vehicle.weight / usual_thrust(total))
+    speeds = np.sqrt(np.maximum(newton, 0.0) / vehicle.k)
+    phases = flight_phases(t, np.interp(t, at, place[:, 2]), speeds, vehicle)
+    flown = [(t >= start) & (t <= end) for phase, start, end in phases if phase == FLIGHT]
+    speed = _smooth(np.linalg.norm(np.gradient(place, at, axis=0), axis=1), at)
+    return np.asarray(np.any(flown, axis=0) & (np.interp(t, at, speed) < CALM))
 
 
 def _smooth(values: Array, t: Array) -> Array:

@@ -6,7 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...runtime.errors import InputError
-from .priors import Base, Setting, changed, from_declared
+from .coefficients import Setting
+from .priors import Base, changed, from_declared
 from .regression import RegressedFlights
 
 # minus the logarithm of likelihood and prior at a setting, and a function for the mode of the

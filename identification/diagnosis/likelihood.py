@@ -22,11 +22,12 @@ from ..motion.sensing_effects import sensing_of
 from ..motion.sensor_noise import sensor_noise
 from ..motion.smoothing import filtered
 from .causal_filter import Track, level
+from .coefficients import Setting
 from .column import Column, Part, Product
 from .flight_rows import BLOCK
 from .noise_search import FIRST_TIME, NoiseSearch
 from .pose_columns import PoseColumns
-from .priors import GAINS, Base, Setting, Starts, in_prior_units
+from .priors import GAINS, Base, Starts, in_prior_units
 from .raw_poses import Poses
 from .regression import RegressedFlights
 from .rotor_innovations import DRIVEN, rotor_innovations, unrounded

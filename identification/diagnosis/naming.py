@@ -23,11 +23,10 @@ from ..findings import (
 from ..logs.table import Array, NamedNumbers, Names, Values
 from ..motion.smoothing import mean_square
 from .advice import FILTERED, composites
-from .coefficients import CENTRAL, coefficient, typical_size, unit_of_change, without
+from .coefficients import CENTRAL, Setting, coefficient, typical_size, unit_of_change, without
 from .column import Column
 from .commanded_rotors import THRUST_FACTORS
 from .commands import Given, what_commands_show
-from .priors import Setting
 from .ranking import FittedPosterior, Report, rank
 from .regression import RegressedFlights
 from .residuals import Balance, balance, transient_disturbances
@@ -84,7 +83,7 @@ def fit_sets(flights: RegressedFlights, library: Sequence[str], report: Report) 
     known_apart = {**given.fixed, "": sensors}
     # no set with a larger error on held-out flight is printed
     for fitted in (likeliest, replace(likeliest, needed={}, behind={})):
-        setting = known_apart | fitted.needed
+        setting = {**known_apart, **fitted.needed}
         residual = balance(flights, setting)
         if residual.better:
             break
@@ -132,6 +131,9 @@ def judged(
         )
         for e in named
     ]
+    for x in effects if "assumed thrust" in doubts else ():
+        if get(x.name).role in THRUST_FACTORS:  # all of it may be the assumed thrust's error
+            names[x.name] = _apart(*x.coefficients.values(), *x.std.values())
     if late := fit.given.late:
         names[late.name] = _apart(*late.coefficients.values(), *late.std.values())
         effects.append(

@@ -16,12 +16,12 @@ from ..motion.sensing_effects import undo_log_sensing
 from ..motion.signals import Signals, in_body
 from ..motion.smoothing import turn_between
 from .causal_filter import Track
-from .coefficients import CENTRAL, STEP, is_delay, typical_size, without
+from .coefficients import CENTRAL, STEP, Setting, is_delay, typical_size, without
 from .column import Column, Columns, Part, Product, along_axis
 from .discrepancy import changing_columns, discrepancy_columns, variables
 from .gusty_wind import gusts
 from .log_offsets import ATTITUDE_TIME_OFFSET, LAG_ASYMMETRY, ROTOR_TIME_OFFSET
-from .priors import MODEL_ERROR, Setting, Starts, variants_of
+from .priors import MODEL_ERROR, Starts, variants_of
 from .raw_poses import Poses
 from .regression import RegressedFlights
 from .rotor_innovations import DRIVEN

@@ -13,10 +13,10 @@ import numpy as np
 
 from ...dynamics.effects import get
 from .climbing import Height, linearised, mode
-from .coefficients import Effects
+from .coefficients import Effects, Setting
 from .column import Column
 from .likelihood import Likelihood
-from .priors import Base, Setting, Starts, prior_size
+from .priors import Base, Starts, prior_size
 from .regression import RegressedFlights
 from .sets import Posterior
 from .starting_points import starts_of

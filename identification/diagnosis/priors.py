@@ -11,13 +11,20 @@ import numpy as np
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
-from ..logs.table import Array, NamedNumbers, Pair, Values
-from .coefficients import CENTRAL, Effects, coefficient, moves_time, typical_size, unit_of_change
+from ..logs.table import Array, Pair, Values
+from .coefficients import (
+    CENTRAL,
+    Effects,
+    Setting,
+    coefficient,
+    moves_time,
+    typical_size,
+    unit_of_change,
+)
 from .column import Column, Part
 from .evidence import Index, Marginal, SetEvidence
 from .regression import RegressedFlights
 
-Setting = dict[str, NamedNumbers]
 # columns of whole effects, with the coefficients of each
 Starts = Mapping[Column, Values]
 

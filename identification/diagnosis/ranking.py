@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from ..findings import Disturbance, Ranking
 from ..logs.table import Names, Pair
+from .coefficients import Setting
 from .pose_search import search_by_poses
-from .priors import Setting
 from .regression import RegressedFlights
 from .row_search import search_by_rows
 from .sets import Posterior

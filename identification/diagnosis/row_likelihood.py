@@ -13,7 +13,7 @@ from ..findings import LEAST_RIVAL
 from ..logs.table import Array, ArrayMap, Data, Names, Pair
 from ..motion.smoothing import mean_square
 from .climbing import Height, height, linearised, mode
-from .coefficients import Effects, without
+from .coefficients import Effects, Setting, without
 from .column import Column, Part
 from .discrepancy import changing_columns, discrepancy_columns, variables
 from .flight_rows import delivered
@@ -21,7 +21,6 @@ from .gusty_wind import gusts
 from .log_offsets import LAG_ASYMMETRY
 from .priors import (
     Base,
-    Setting,
     Starts,
     from_declared,
     in_prior_units,

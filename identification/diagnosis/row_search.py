@@ -7,8 +7,8 @@ linearisation, and so is each next likeliest, until the likeliest is a fitted on
 
 from collections.abc import Callable, Sequence
 
-from .coefficients import without
-from .priors import Base, Setting
+from .coefficients import Setting, without
+from .priors import Base
 from .regression import RegressedFlights
 from .row_likelihood import RowLikelihood
 from .sets import Posterior, is_possible

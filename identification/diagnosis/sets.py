@@ -13,7 +13,7 @@ from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Found
 from ..findings import LEAST_RIVAL, RankedSet, Ranking
 from ..logs.table import Array, NamedNumbers, Pair, Values
-from .coefficients import CENTRAL, Effects, coefficient, moves_time, typical_sizes
+from .coefficients import CENTRAL, Effects, Setting, coefficient, moves_time, typical_sizes
 from .column import Column, Part
 from .discrepancy import SHARE_OF_EFFECT
 from .evidence import Index, Marginal, SetEvidence, evidence_of_one_more, tempering
@@ -22,7 +22,6 @@ from .priors import (
     EXPECTED,
     NEGLIGIBLE,
     Base,
-    Setting,
     Variant,
     Variants,
     changed,
@@ -413,7 +412,7 @@ class Posterior:
         if widened:
             deviations = deviations * base.scatter(columns, mode, self.power)
         setting = {e: dict(self.flights.coefficients({}, e)) for e, *_ in columns}
-        std: Setting = {e: {} for e in setting}
+        std: dict[str, NamedNumbers] = {e: {} for e in setting}
         size = base.size[base.at(columns)]
         sized = zip(columns, (mode * size).tolist(), (deviations * size).tolist(), strict=True)
         for c, x, deviation in sized:

@@ -199,3 +199,26 @@ def continuous(quaternion: Array) -> Array:
     signs = np.sign(np.sum(quaternion[1:] * quaternion[:-1], axis=1))
     signs = np.cumprod(np.where(signs == 0, 1.0, signs))
     return np.asarray(quaternion * np.concatenate([[1.0], signs])[:, None])
+
+
+# thrust and torques of four rotors, each of length 1
+_TOGETHER = 0.5 * np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, -1, 1], [1, -1, 1, -1]])
+_WELCH = 256  # samples of a spectrum, and held beyond either end
+
+
+def likeliest_speeds(speeds: Array, period: float) -> Array:
+    """Return the likeliest true rotor speeds (n, 4) behind measured ones, rad/s, without a delay.
+
+    Wiener's filter of the sums and differences of their squares, which make thrust and torques. The
+    noise is white, as high as the highest quarter of the spectrum: no rotor follows there.
+    """
+    squares = np.square(speeds) @ _TOGETHER
+    frequency, power = power_spectrum(squares, period, _WELCH)
+    noise = power[-len(power) // 4 :].mean(axis=0)
+    share = np.maximum(1.0 - noise / np.maximum(power, np.finfo(float).tiny), 0.0)
+    share[0] = 1.0  # of the mean, which the spectrum is without
+    longer = np.pad(squares, ((_WELCH, _WELCH), (0, 0)), mode="edge")
+    every = np.fft.rfftfreq(len(longer), period)
+    gains = np.column_stack([np.interp(every, frequency, x) for x in share.T])
+    smooth = np.fft.irfft(gains * np.fft.rfft(longer, axis=0), len(longer), axis=0)
+    return np.sqrt(np.maximum(smooth[_WELCH:-_WELCH] @ _TOGETHER, 0.0))

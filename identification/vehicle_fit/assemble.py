@@ -64,6 +64,9 @@ def vehicle_of(
     if late:
         lag = get(of_lag).coefficients[0].name
         coefficients[Role.LAG] = {lag: estimates[of_lag].value}
+    effects = [EffectSetting(effect_of(r), c) for r, c in coefficients.items() if c]
+    if (behind := shown.get("time_offset", 0.0)) > 0.0:
+        effects.append(EffectSetting("latency", {"d": behind}))
     inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
     even = np.allclose(geometry.positions, geometry.arm * QUADRANT)
     vehicle = Vehicle(
@@ -80,7 +83,7 @@ def vehicle_of(
         spin=model.spin.copy(),
         rotor_positions=None if even else geometry.positions,
         com=np.array([shown.get(f"com {a}", 0.0) for a in "xyz"]),
-        effects=tuple(EffectSetting(effect_of(r), c) for r, c in coefficients.items() if c),
+        effects=tuple(effects),
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),
     )
@@ -124,19 +127,12 @@ def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertaint
 
 def advice_of(estimates: Estimated) -> list[str]:
     """Return the flights or arguments to add for quantities missing from the logs."""
-    lag = effect_of(Role.LAG)
-    missing = {
-        "lag" if name == lag else name: e
-        for name, e in estimates.items()
-        if e.status in (ASSUMED, NOTHING)
-    }
+    known = estimates | {"lag": estimates[effect_of(Role.LAG)]}
     if estimates["arm_l"].status == ASSUMED:  # and inertia with it
-        missing = {name: e for name, e in missing.items() if name not in ("Jxx", "Jyy", "Jzz")}
-    nowhere = {name for name, e in missing.items() if math.isnan(e.value)}
-    advice, unmeasured = QUANTITIES["advice"], QUANTITIES["unmeasured"]
-    texts = (
-        (unmeasured if name in nowhere & unmeasured.keys() else advice)[name]
-        for name in advice
-        if name in missing
-    )
+        known = {name: e for name, e in known.items() if name not in ("Jxx", "Jyy", "Jzz")}
+    texts = [
+        QUANTITIES["unmeasured"].get(name, text) if math.isnan(known[name].value) else text
+        for name, text in QUANTITIES["advice"].items()
+        if name in known and known[name].status in (ASSUMED, NOTHING)
+    ]
     return list(dict.fromkeys(texts))

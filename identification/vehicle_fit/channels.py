@@ -53,6 +53,14 @@ class MotionPiece(NamedTuple):
     command: Array | None = None  # (n, 4), 0 to 1
     voltage: Array | None = None  # (n,) V
 
+    def set_back(self, late: int) -> "MotionPiece":
+        """Return the piece with its rotors ``late`` samples later; the first or last sample holds
+        at the end.
+        """
+        rows = np.clip(np.arange(len(self.t)) - late, 0, len(self.t) - 1)
+        of_rotors = {n: getattr(self, n) for n in ("rotor_speeds", "command", "voltage")}
+        return self._replace(**{n: x[rows] for n, x in of_rotors.items() if x is not None})
+
     def measured(self) -> Array:
         """Return specific force and angular acceleration (n, 6)."""
         return np.column_stack([self.specific_force, self.angular_acceleration])
@@ -169,7 +177,7 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     if not pieces:
         raise InputError(
             f"{logs[0].name}: no piece of {_SHORTEST_PIECE:g} s in flight is unbroken "
-            "there; expected a longer flight, or another --from and --to"
+            "in pose and sensors; expected a longer flight, or another --from and --to"
         )
     return pieces, sources
 
@@ -191,7 +199,7 @@ def _felt(s: Signals) -> Array:
 
 def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
     """Yield motion by the pose's derivatives, with accelerometer and gyro in their place if any."""
-    for s in log_signals(log, wide_hz=np.inf):
+    for s in log_signals(log, wide_hz=np.inf) if pose_pieces(log) else ():
         force, velocity = _felt(s), in_body(s.velocity, s.rotation)
         rate, turning = s.angular_velocity, s.angular_acceleration
         if sources.force == "accelerometer" and log.accelerometer is not None:

@@ -22,6 +22,9 @@ from .channels import MotionPiece, Pieces
 from .model import PAIRS, Model, coefficients
 from .spectra import BAND, Segment, segments_of
 
+# s at either end of a piece, outside all segments: the rotors' columns are set back by less, and
+# their lag and the low-passes settle there
+MARGIN = 0.1
 _STEP = {"lag": 1e-3, "gamma": 0.05}  # finite differences
 # Hz: the flight loop answers slower, unmeasured moments with rotor torque, and this part of the
 # torque turns nothing. From 3 to 15 Hz regression finds nearly all of the torque, below a fifth to
@@ -58,7 +61,9 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
     values = model.values(theta)
     centre = {name: values[name] for name in model.nonlinear}
     segments: list[Segment] = []
-    for piece in pieces:
+    for whole in pieces:
+        late, ends = round(model.late / whole.period), round(MARGIN / whole.period)
+        piece, inner = whole.set_back(late), slice(ends, len(whole.t) - ends)
         air, rotors = air_columns(piece, model), rotor_columns(piece, model, centre)
         base = np.column_stack([*rotors.values()])
         parts = [np.nan_to_num(piece.measured()), *air.values(), base]
@@ -67,11 +72,11 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
             moved = np.column_stack([*rotor_columns(piece, model, there).values()])
             parts.append((moved - base) / _STEP[name])
         stacked = low_pass(np.column_stack(parts), model.band, piece.period)
-        for s in segments_of(stacked, piece.period, piece.log, model.band):
+        for s in segments_of(stacked[inner], piece.t[inner], piece.period, piece.log, model.band):
             turn = -2j * np.pi * s.frequency[:, None]
-            at_once, late = np.split(s.columns, [6 + len(air)], axis=2)
-            late = late * np.exp(turn * centre["delay"])
-            blocks = [at_once, late, turn * late[:, :, : len(rotors)]]
+            at_once, delayed = np.split(s.columns, [6 + len(air)], axis=2)
+            delayed = delayed * np.exp(turn * (centre["delay"] - late * piece.period))
+            blocks = [at_once, delayed, turn * delayed[:, :, : len(rotors)]]
             segments.append(s._replace(columns=np.concatenate(blocks, axis=2)))
     seconds = np.array([len(p.t) * p.period for p in pieces])
     names = (*air, *rotors)

@@ -41,7 +41,8 @@ def estimates_of(fit: VehicleFit) -> Estimated:
     Raises:
         InputError: neither turning nor an arm says how large the vehicle is.
     """
-    said = {e.name: e for e in (*_thrust(fit), *_size(fit))}
+    thrust = (e._replace(of_force=True) for e in _thrust(fit))
+    said = {e.name: e for e in (*thrust, *_size(fit))}
     # m for each unit of the rotors' positions
     arm = UNIT if fit.model.geometry.known else said["arm_l"][1:4]
     further = (*_yaw(fit, said, arm), *_lag(fit), *_centre(fit, arm), *_air(fit, arm))
@@ -194,21 +195,22 @@ def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
 
 def _lag(fit: VehicleFit) -> Estimates:
     """Yield the rotors' lag, and the time offset of the motion."""
-    how = f"force and turning against {fit.model.sources.rotors}"
-    known, doubt = (
-        UNKNOWN,
-        (
-            "force follows the logged rotor speeds at once: they are measured, and no command is "
-            "logged beside them"
-        ),
-    )
+    name, how = effect_of(Role.LAG), f"force and turning against {fit.model.sources.rotors}"
     if "lag" in fit.model.free:
         if not fit.model.commands:
             how += ", which therefore are commanded, not measured"
         known = fit.interval("lag")
-        late = "a time offset of the motion does nearly the same here"
-        doubt = "" if told(known) else late
-    yield _estimate(effect_of(Role.LAG), known, "s", how, doubt)
+        alike = "a time offset of the motion does nearly the same here"
+        doubt = fit.doubt or alike * (not told(known))
+        # without the fit's value the thrust would come early
+        status = ASSUMED if doubt else IDENTIFIED
+        yield _estimate(name, known, "s", doubt or how, status=status)
+    else:
+        doubt = (
+            "force follows the logged rotor speeds at once: they are measured, and no command is "
+            "logged beside them"
+        )
+        yield _estimate(name, UNKNOWN, "s", how, doubt)
     offset = fit.interval("delay", False)
     yield _estimate("time_offset", offset, "s", "of the motion behind the rotors")
 
@@ -253,7 +255,8 @@ def _air(fit: VehicleFit, arm: Interval) -> Estimates:
         why = (fit.doubt if turns else "") or fit.kept[kind]
         for index, parameter in enumerate(effect.parameters, effect.first):
             known = _times(fit.interval(parameter, turns), size)
-            yield _of_effect(effect.role, index, known, hows[effect.shows], why)
+            estimate = _of_effect(effect.role, index, known, hows[effect.shows], why)
+            yield estimate._replace(of_force=not turns)
     if fit.hidden:
         value, deviation, least = (arm[0] * x for x in fit.hidden)
         wide = fit.width * deviation

@@ -28,7 +28,7 @@ from ...dynamics.effects import Role
 from ...runtime.page_files import page_template
 from ..logs.table import NamedNumbers, Names
 from .effect_settings import coefficient_of, effect_of, linear_drag
-from .result import ASSUMED, IDENTIFIED, Identified
+from .result import ASSUMED, Identified
 
 AIR_DENSITY = 1.225  # kg/m3, at sea level, as in both autopilots
 _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
@@ -85,7 +85,7 @@ def _simulator(name: str, identified: Identified) -> str:
         v=v,
         notes=notes,
         positions=(v.positions - v.com).tolist(),
-        lag=lag.value if lag.status == IDENTIFIED else None,
+        lag=lag.value if lag.value > 0.0 else None,
         drag=-np.diag(drag) if any(drag) else None,
         linear_drag=0.5 * sum(coefficient_of(v, Role.ROTOR_DRAG, i) for i in range(2)),
         effect=partial(coefficient_of, v),

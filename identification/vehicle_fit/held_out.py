@@ -8,8 +8,8 @@ stands if no quantity is worse than the better one of no change and of thrust an
 the least mean of these ratios is the vehicle.
 
 One flight tells how the body rate decays, and nothing else of a reaction. All nine coefficients
-hold the trajectory, too: on a slower flight of a racer the body rate was off by 2.1 times the error
-of no change, and by 1.06 times with two dampings.
+hold the trajectory, too: on a slower flight of a racer the body rate was off by 1.9 times the error
+of no change, and by 0.9 times with two dampings.
 """
 
 from collections.abc import Callable
@@ -30,16 +30,15 @@ from ..prediction import (
     errors_at,
     logged_starts,
 )
-from .channels import Pieces
 from .closed_loop import LoopFit, fit_loop
 from .model import coefficients
 from .solve import VehicleFit, refitted
-from .spectra import Spectra, edges_of
+from .spectra import Spectra
 
 FOLDS = 3  # every third segment is held out at a time
 LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
 _ALIKE = 1.02  # ratio of errors: two models within it count as equal
-_DRAGS = (Role.ROTOR_DRAG, Role.BODY_DRAG, Role.LAG)
+_DRAGS = (Role.ROTOR_DRAG, Role.BODY_DRAG, Role.LAG, Role.DELAY)
 _HORIZON = 0.5  # s
 OTHER_FLIGHTS = "flights_left_out"
 NO_CHANGE, SIMPLEST, WHOLE = "no change", "thrust and drag", "force and torque"
@@ -85,20 +84,17 @@ class _HeldParts(NamedTuple):
         return errors
 
 
-def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -> _HeldParts:
+def _held_parts(logs: Logs, fit: VehicleFit, vehicle: Vehicle) -> _HeldParts:
     """Return the starts in the segments of a fit.
 
     Raises:
         InputError: too little would be left of the logs.
     """
     number = np.array([s.log for s in fit.balance.segments])
-    edges = [edges_of(len(piece.t), piece.period) for piece in pieces]
-    ends = [piece.t[[at[:-1], at[1:] - 1]] for piece, at in zip(pieces, edges, strict=True)]
-    spans = np.concatenate(ends, axis=1).T  # s, from and to
-    starts = []
+    spans, starts = [s.span for s in fit.balance.segments], []
     for i, log in enumerate(logs):
         own = np.flatnonzero(number == i)
-        part = logged_starts(log, vehicle, spans[own].tolist(), _HORIZON)
+        part = logged_starts(log, vehicle, [spans[k] for k in own], _HORIZON)
         starts.append(part._replace(segment=own[part.segment]))
     folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
     refits = [
@@ -111,7 +107,6 @@ def _held_parts(pieces: Pieces, logs: Logs, fit: VehicleFit, vehicle: Vehicle) -
 
 
 def held_out(
-    pieces: Pieces,
     logs: Logs,
     fit: VehicleFit,
     vehicle_of: Callable[[VehicleFit, str], Vehicle],
@@ -120,7 +115,6 @@ def held_out(
     logs without a pose, by the balance of forces and torques in the blocks alone.
 
     Args:
-        pieces: of the logs.
         logs: the flights.
         fit: of all of them.
         vehicle_of: the vehicle of a fit, with a reason to doubt its torque or an empty text.
@@ -131,7 +125,7 @@ def held_out(
     if not all(log.has_pose for log in logs):
         return _by_balance(fit)
     whole = vehicle_of(fit, "")
-    parts = _held_parts(pieces, logs, fit, whole)
+    parts = _held_parts(logs, fit, whole)
     errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
     loop: LoopFit | None = None
     if not errors:

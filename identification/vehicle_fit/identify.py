@@ -24,7 +24,7 @@ from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
 from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .closed_loop import UNITS
-from .columns import ANSWERED_HZ, balance
+from .columns import ANSWERED_HZ
 from .effect_settings import effect_of
 from .estimates import estimates_of, thrust_of
 from .geometry import Geometry
@@ -49,9 +49,11 @@ _CLOSE = 0.01  # share of thrust: two bands may differ by it at any interval
 _LEAST_VOLTAGE_RANGE = 0.03  # share: no exponent is fitted to a smaller range of voltage
 _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
 _NO_OFFSET = 1e-6  # s, deviation of an absent time offset
+_ALIGNMENTS = 4  # at most, each by the offset of the fit before
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
 WITHOUT_FORCE = "an unchanged velocity predicts data outside the fit better than the force"
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
+HIDDEN = "the interval of the flight loop's reaction holds 0"
 LOOP = "predictions of half a second from states of the flight: no part of the vehicle"
 
 
@@ -83,7 +85,14 @@ def identify(
     if not logs:
         raise InputError("identify: no log is given; expected one or more of a vehicle")
     pieces, sources = checked_pieces(logs, windows)
-    notes = [f"warning: {log.name}: {text}" for log in logs for text in _doubts(log)]
+    kept = sorted({piece.log for piece in pieces})
+    pieces = [piece._replace(log=kept.index(piece.log)) for piece in pieces]
+    broken = "left out: no piece of 3 s in flight is unbroken in pose and sensors"
+    notes = []
+    for i, log in enumerate(logs):
+        doubts = _doubts(log) if i in kept else [broken]
+        notes += [f"warning: {log.name}: {text}" for text in doubts]
+    logs = [logs[i] for i in kept]
     basic = Model(
         mass, geometry, sources, voltage_ref=_voltage(pieces), speed_noise=speed_noise(pieces)
     )
@@ -130,10 +139,9 @@ def identify(
         return named, vehicle_of(name, part, named, logs, step, motors)
 
     report(0.9, "predicting what is held out")
-    tested = held_out(pieces, logs, fit, lambda part, why: described(part, why)[1])
+    tested = held_out(logs, fit, lambda part, why: described(part, why)[1])
     named, vehicle = described(fit, tested.why)
-    if not basic.commands:
-        check_thrust(named["k"].value, vehicle.rotor_radius, logs[0].name)
+    check_thrust(vehicle, not basic.commands, logs[0].name)
     _, excess = nearest_body(fit)
     if excess > _APART:
         notes.append(
@@ -173,21 +181,19 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
         ):
             name, wide = f"closed_loop {c}", 1.96 * size
             if size > 0.0:
-                shows = stands if abs(value) > wide else NOTHING
-                named[name] = Estimate(name, value, value - wide, value + wide, unit, shows, LOOP)
-    if not tested.stands:
-        for name, e in named.items():
-            if e.status == IDENTIFIED:
-                named[name] = e._replace(status=ASSUMED, how=f"{e.how}; nothing could be held out")
+                shows = (stands, LOOP) if abs(value) > wide else (NOTHING, HIDDEN)
+                named[name] = Estimate(name, value, value - wide, value + wide, unit, *shows)
     flown = models.get(tested.stands, vehicle)
-    for effect in vehicle.effects:
-        for name in (effect.name, *(f"{effect.name} {c}" for c in effect.coefficients)):
-            if effect not in flown.effects and name in named:
-                named[name] = named[name]._replace(status=REFUTED, how=WITHOUT_EFFECTS)
-    if flown.status.force == REFUTED:
-        for name, e in named.items():
-            if e.status == IDENTIFIED and name.startswith(("k", "thrust", "hover")):
-                named[name] = e._replace(status=REFUTED, how=WITHOUT_FORCE)
+    gone = {effect.name for effect in vehicle.effects if effect not in flown.effects}
+    for name, e in named.items():
+        status, how = e.status, e.how
+        if name.split()[0] in gone:
+            status, how = REFUTED, WITHOUT_EFFECTS
+        elif status == IDENTIFIED and not tested.stands:
+            status, how = ASSUMED, f"{how}; nothing could be held out"
+        elif status == IDENTIFIED and e.of_force and flown.status.force == REFUTED:
+            status, how = REFUTED, WITHOUT_FORCE
+        named[name] = e._replace(status=status, how=how)
     known = {e.name: e.status for e in named.values() if e.status != NOTHING}
     return replace(flown, status=replace(flown.status, coefficients=known))
 
@@ -197,8 +203,10 @@ def _lag_alone(fit: VehicleFit) -> Estimate:
     start = np.where([name == "delay" for name in fit.model.free], 0.0, fit.theta)
     alone = fit.again(start, prior={**fit.model.prior, "delay": _NO_OFFSET})
     known = alone.interval("lag")
-    how = "of a model without a time offset: what other tools call the lag"
-    return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
+    status, how = IDENTIFIED, "of a model without a time offset: what other tools call the lag"
+    if not told(known):
+        status, how = NOTHING, "the interval is wider than half the value"
+    return Estimate("lag without offset", *known, "s", status, how)
 
 
 def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[Pieces, Sources]:
@@ -234,15 +242,13 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
     """Return the fit of the basic model."""
     if not basic.commands:
         model, start = first_model(pieces, basic, "delay")
-        plain = solve(pieces, model, start)
-        # do the logged speeds lead the motion as commands do?
+        plain = _aligned(solve(pieces, model, start))
+        # do the logged speeds lead the motion as commands do? An offset passes for a lag and a lag
+        # for an offset: the search starts from both
         model, start = plain.model.with_more(plain.theta, "lag")
-        late = balance(pieces, replace(model, speed_noise=0.0), start)
-        _, (lag,), (size,) = score_tests(plain, {"lag": ("lag",)}, late)["lag"]
-        if lag < _LEAST_LAG * size:
-            return plain
         start[-1] = _LAGS[0]
-        other = solve(pieces, model, start)
+        both = [_aligned(solve(pieces, replace(model, late=x), start)) for x in (0.0, model.late)]
+        other = min(both, key=lambda f: f.loss)
         lag, low, _ = other.interval("lag", logarithm=False)
         sure = lag > _LEAST_LAG * (lag - low) / other.width
         return other if sure and plain.loss - other.loss > _cost(plain, 1) else plain
@@ -252,7 +258,8 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         model, start = first_model(pieces, replace(basic, exponents=exponents), *nonlinear)
         starts = ([*start[:-1], lag] for lag in lags)
-        fit = min((solve(pieces, model, np.array(x)) for x in starts), key=lambda f: f.loss)
+        fits = (_aligned(solve(pieces, model, np.array(x))) for x in starts)
+        fit = min(fits, key=lambda f: f.loss)
         cost = fit.loss + _cost(fit, len(exponents))
         thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
@@ -263,6 +270,16 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
             "thrust does not grow with the motor commands; expected cmd1..cmd4, 0 to 1"
         )
     return best[1]
+
+
+def _aligned(fit: VehicleFit) -> VehicleFit:
+    """Return the fit with the rotors' columns set back by its own time offset, to a sample."""
+    for _ in range(_ALIGNMENTS):
+        late = fit.values["delay"]
+        if abs(late - fit.model.late) < fit.balance.pieces[0].period:
+            break
+        fit = fit.again(late=late)
+    return fit
 
 
 def _agreeing(fit: VehicleFit) -> VehicleFit:
@@ -297,6 +314,14 @@ def _cost(fit: VehicleFit, parameters: int) -> float:
     return _PENALTY * parameters * math.log(6 * frequencies)
 
 
+def _above(fit: VehicleFit, name: str) -> float:
+    """Return the size of a further effect above the bound of the search, standard deviations."""
+    at = [fit.model.free.index(p) for p in FURTHER[name].parameters]
+    theta, covariance = fit.theta[at], fit.covariance[np.ix_(at, at)]
+    size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
+    return size - math.sqrt(_cost(fit, len(at)))
+
+
 def _with_optional(fit: VehicleFit) -> VehicleFit:
     """Return a fit with further effects, and a hidden moment of velocity.
 
@@ -327,12 +352,15 @@ def _with_optional(fit: VehicleFit) -> VehicleFit:
         if all(richer.values[p] > 0.0 for f in asked if f.positive for p in f.parameters):
             fit = richer
             kept[name] = ""
+    # a later effect may stand for an earlier one
+    while kept and _above(fit, name := min(kept, key=lambda n: _above(fit, n))) < 0.0:
+        del kept[name]
+        stays = [p not in FURTHER[name].parameters for p in fit.model.free]
+        free = tuple(p for p, stay in zip(fit.model.free, stays, strict=True) if stay)
+        fit = fit.again(fit.theta[stays], free=free)
     # an effect taken because it stood out is too large on average, if another flight of the same
     # vehicle would hide it: its interval reaches down to sizes below the bound
     for name in kept:
-        at = [fit.model.free.index(p) for p in FURTHER[name].parameters]
-        theta, covariance = fit.theta[at], fit.covariance[np.ix_(at, at)]
-        size = math.sqrt(theta @ np.linalg.solve(covariance, theta))
-        if size < math.sqrt(_cost(fit, len(at))) + fit.width:
+        if _above(fit, name) < fit.width:
             kept[name] = "it shows, but by so little that what shows is too large on average"
     return replace(fit, kept=kept, hidden=hidden)

@@ -46,6 +46,9 @@ class Model:
     voltage_ref: float = 0.0  # V; 0: voltage is not used
     opposite: bool = False  # rotors turn against their usual senses
     band: float = BAND  # Hz: force and turning are compared up to here
+    # s: the rotors' columns are set back by so much before the segments are cut. The offset's rest
+    # is a phase in each segment; the window stays
+    late: float = 0.0
     # rad/s, standard deviation of one measured speed; not known of speeds behind a lag
     speed_noise: float = 0.0
     free: Names = ()

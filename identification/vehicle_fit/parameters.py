@@ -18,7 +18,7 @@ from ..logs.table import ArrayPair, Data, NamedArrays, Pair
 from .channels import Pieces
 from .columns import ANSWERED_HZ, rotor_columns
 from .geometry import FLAT, GRAVITY, GYRATION
-from .model import Model
+from .model import LOGARITHMIC, Model
 from .spectra import BAND
 
 # accelerometer with its factory's calibration alone, m/s2 and rad: 20 mg, as in data sheets of such
@@ -29,6 +29,9 @@ POSED_BIAS = 0.03
 TILT = 0.02
 # s, offset between the motion's clock and the rotors': sensors' own filters, transport
 DELAY = 0.02
+# standard deviation of the logarithm of a moment of inertia about its start: part of a flight can
+# show no turn by its torque
+_FACTOR = 3.0
 # s: turning is compared with torque at these delays, before the fit has its own. Commands of a
 # Crazyflie and of flight controllers lead the motion by 30 to 60 ms
 _FIRST_DELAYS = np.linspace(0.0, 0.08, 9)
@@ -95,6 +98,7 @@ def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, A
     units = ChainMap(basic, biases, *(further.parameters for further in FURTHER.values()))
     scale = each | {p: math.prod(known.get(x, x) for x in unit) for p, unit in units.items()}
     free, prior = (*each, *basic), {"delay": DELAY}
+    prior |= {j: _FACTOR * known[j] for j in LOGARITHMIC}
     if model.sources.force == "accelerometer":
         free = (*free, *biases)
         prior |= {**dict.fromkeys(biases, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}

@@ -1,24 +1,36 @@
-"""Rotor speeds that no quadrotor has: an impossible thrust."""
+"""A mass and rotor speeds that no quadrotor has."""
 
 import math
 
+from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 
+# N/m2, weight over the rotors' discs: the shipped vehicles have 36 to 40, a racer 143
+_LOADINGS = (3.0, 3000.0)
 # thrust over air density, disc area and squared tip speed: propellers of 0.03 to 5 kg have 0.005 to
 # 0.03; a radius known by the arm alone may be off by a factor of 1.4, thrust then by 4
 _THRUST_COEFFICIENTS = (0.002, 0.1)
 _AIR_DENSITY = 1.225  # kg/m3
 
 
-def check_thrust(k: float, radius: float, log: str) -> None:
-    """Check a thrust coefficient ``k`` in N/(rad/s)^2 of a rotor with a radius in m.
+def check_thrust(vehicle: Vehicle, measured: bool, log: str) -> None:
+    """Check weight and thrust of a vehicle against its rotors' size; ``measured``: its rotor speeds
+    are those of a log.
 
     Raises:
-        InputError: no propeller has such a thrust coefficient.
+        InputError: no quadrotor has such a mass, or no propeller such a thrust coefficient.
     """
-    coefficient = k / (_AIR_DENSITY * math.pi * radius**4)
-    low, high = _THRUST_COEFFICIENTS
-    if low <= coefficient <= high:
+    disc = math.pi * vehicle.rotor_radius**2
+    loading, (low, high) = vehicle.weight / (4.0 * disc), _LOADINGS
+    if not low <= loading <= high:
+        raise InputError(
+            f"--mass {vehicle.mass:g} with rotors {vehicle.arm_l:.3g} m from the body axes: "
+            f"{loading:.3g} N on a square metre of their discs; expected {low:g} to {high:g}: "
+            "the mass in kg, the distance in m"
+        )
+    radius, (low, high) = vehicle.rotor_radius, _THRUST_COEFFICIENTS
+    coefficient = vehicle.k[0] / (_AIR_DENSITY * disc * radius**2)
+    if not measured or low <= coefficient <= high:
         return
     usual = math.sqrt(coefficient / math.sqrt(low * high))
     raise InputError(

@@ -20,7 +20,7 @@ from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
 from .held_out import LEAST_HZ, powers, refuted
 from .model import coefficients
-from .result import ASSUMED, NOTHING, Identified
+from .result import ASSUMED, IDENTIFIED, NOTHING, Identified
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,10 +76,10 @@ def headline(identified: Identified) -> str:
     told = ", ".join(
         f"{e.name} {e.value:.3g} ± {0.5 * (e.high - e.low):.2g} {e.unit}"
         for e in shown
-        if e.status not in (ASSUMED, NOTHING)
+        if e.status == IDENTIFIED
     )
     rest = f"; assumed, since these logs do not tell: {assumed}" if assumed else ""
-    return f"{begin}identified: {told}{rest}"
+    return f"{begin}identified: {told or 'nothing'}{rest}"
 
 
 def use_of(identified: Identified) -> str:

@@ -34,6 +34,7 @@ class Estimate(NamedTuple):
     unit: str
     status: str  # identified, assumed, given, refuted, not identifiable
     how: str  # channels, assumption, or reason not to know
+    of_force: bool = False  # falls where held-out flight refutes the force
 
 
 Estimated = dict[str, Estimate]  # by name

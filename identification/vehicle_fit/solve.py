@@ -32,6 +32,7 @@ _RANGES = {"lag": (0.0, 0.5), "delay": (-0.1, 0.1), "gamma": (-4.0, 4.0)}  # s, 
 _MOST_CHANGE = 0.05  # for each of these in a round
 # one frequency's leverage: noise is hidden where the parameters explain nearly all power
 _MOST_LEVERAGE = 0.8
+_UNKNOWN = 0.1  # least share of the residual: the noise is known to some per cent only
 # largest moment of inertia over the sum of the others: 1 of a flat body, and a file rounds
 _FLATTEST = 0.995
 
@@ -119,9 +120,10 @@ def solve(pieces: Pieces, model: Model, theta: Array) -> VehicleFit:
     _, information, rows, left = _newton(made, np.sum(grams, axis=0), model, theta)
     scores = np.array([np.einsum("iac,acd,ad->i", rows, g, left, optimize=True) for g in grams])
     # twice the negative log-likelihood of noise with the residual's spectrum
+    unknown = _unknown(made, spectra, model, theta)
     logs = (
         (s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p))).sum()
-        for s, p in zip(made.segments, spectra, strict=True)
+        for s, p in zip(made.segments, unknown, strict=True)
     )
     return VehicleFit(model, theta, information, scores, TAPERS * sum(logs), made, spectra)
 
@@ -137,7 +139,7 @@ def refitted(fit: VehicleFit, fold: Index) -> list[tuple[Mask, VehicleFit]]:
     for held in np.unique(fold):
         keep = fold != held
         if not keep.any():
-            raise InputError("the flight is too short; expected more than 5 s without a break")
+            raise InputError("the flight is too short; expected 7.5 s in flight without a break")
         total = grams[keep].sum(axis=0)
         theta, information, _ = _moved(fit.balance, total, fit.model, fit.theta, _ROUNDS)
         part = replace(fit, theta=theta, information=information, scores=fit.scores[keep])
@@ -170,17 +172,15 @@ def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
 
 
 def score_tests(
-    fit: VehicleFit, groups: Mapping[str, Sequence[str]], made: BalanceSpectra | None = None
+    fit: VehicleFit, groups: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[float, Array, Array]]:
     """Return, for each group of further parameters alone, the fall of twice the negative
-    log-likelihood, the parameters after one step from 0, and their standard deviations.
-
-    The last two are in SI units; ``made`` stands in place of the fit's own transforms.
+    log-likelihood, the parameters after one step from 0, and their standard deviations, both in SI
+    units.
     """
     model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
-    made = made or fit.balance
-    grams = np.sum(_grams(made, fit.spectra, model.band), axis=0)
-    step, information, *_ = _newton(made, grams, model, start)
+    grams = np.sum(_grams(fit.balance, fit.spectra, model.band), axis=0)
+    step, information, *_ = _newton(fit.balance, grams, model, start)
     # information of the further parameters while the fit's own follow, and behind it the slope
     both, n, tests = np.column_stack([information, information @ step]), len(fit.theta), {}
     both = both[n:, n:] - information[n:, :n] @ np.linalg.solve(information[:n, :n], both[:n, n:])
@@ -220,7 +220,7 @@ def _grams(made: BalanceSpectra, spectra: Spectra, band: float) -> Spectra:
     noise, own = made.noise.T @ made.noise, slice(1, 1 + len(made.names))
     grams = []
     for s, spectrum in zip(made.segments, spectra, strict=True):
-        gain = 1.0 / (1.0 + (s.frequency / band) ** 4) ** 2
+        gain = _passed(s.frequency, band)
         gram = []
         for axis, weight in enumerate(s.weight / spectrum.T):
             both = s.columns[:, :, [axis, *range(6, s.columns.shape[2])]]
@@ -230,6 +230,29 @@ def _grams(made: BalanceSpectra, spectra: Spectra, band: float) -> Spectra:
             gram[axis][own, own] -= noise * (weight @ gain * TAPERS)
         grams.append(np.array(gram))
     return grams
+
+
+def _unknown(made: BalanceSpectra, spectra: Spectra, model: Model, theta: Array) -> Spectra:
+    """Return the residual's spectrum (m, 6) without the part known from the measured speeds.
+
+    Their noise is a part of both: of noise n in the power P of a column, Wiener's filter knows
+    n^2 / P. Else a lag, by smoothing the noise of measured speeds, would be likelier than none.
+    """
+    noise = np.square(made.noise).sum(axis=0)  # (c,), per Hz
+    at = np.flatnonzero(noise)
+    columns = [s.columns[:, :, 6 + at] for s in made.segments]
+    powers = [np.square(np.abs(x)).mean(axis=0) for x in columns]
+    powers = residual_spectra(made.segments, powers) if at.size else powers
+    gains, out = np.square(made.combined(model, theta)[:, 1 + at]), []  # (6, ..)
+    for s, spectrum, power in zip(made.segments, spectra, powers, strict=True):
+        passed = np.outer(_passed(s.frequency, model.band), noise[at])
+        out.append(np.maximum(spectrum - (passed**2 / power) @ gains.T, _UNKNOWN * spectrum))
+    return out
+
+
+def _passed(frequency: Array, band: float) -> Array:
+    """Return the share of a power behind the columns' low-pass."""
+    return 1.0 / (1.0 + (frequency / band) ** 4) ** 2
 
 
 def _newton(

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.arrays import Array, Complex, Index
+from ...runtime.arrays import Array, Complex
+from ..logs.table import Pair
 
 _SEGMENT = 5.0  # s, length of one transform; the inverse is the step of frequency
 TAPERS = 3  # sine tapers (Riedel and Sidorenko, 1995): a low leak, and little lost
@@ -32,22 +33,19 @@ class Segment(NamedTuple):
     """One segment's transforms."""
 
     log: int
+    span: Pair  # s, first and last sample
     frequency: Array  # (m,) Hz
     weight: Array  # (m,): 2 of a complex number, 1 of a real one; over the number of tapers
     columns: Complex  # (K, m, c): per root Hz
 
 
-def edges_of(n: int, period: float) -> Index:
-    """Return the ends (count + 1,) of the segments, of about equal length, of a piece."""
-    return np.linspace(0, n, 1 + max(1, round(n * period / _SEGMENT))).astype(np.int64)
-
-
-def segments_of(columns: Array, period: float, log: int, band: float) -> list[Segment]:
-    """Return the transforms of a piece's columns (n, c), cut into segments of about equal
-    length.
+def segments_of(columns: Array, t: Array, period: float, log: int, band: float) -> list[Segment]:
+    """Return the transforms of a piece's columns (n, c) at times (n,), cut into segments of about
+    equal length.
     """
-    out = []
-    for a, b in itertools.pairwise(edges_of(len(columns), period)):
+    out, n = [], len(columns)
+    edges = np.linspace(0, n, 1 + max(1, round(n * period / _SEGMENT))).astype(np.int64)
+    for a, b in itertools.pairwise(edges):
         size = b - a
         frequency = np.asarray(np.fft.rfftfreq(size, period), np.float64)
         inside = frequency <= min(band, 0.4 / period)
@@ -57,7 +55,7 @@ def segments_of(columns: Array, period: float, log: int, band: float) -> list[Se
         waves = np.sin(np.arange(1, TAPERS + 1)[:, None, None] * places[:, None])
         tapers = np.sqrt(2.0 * period / (size + 1)) * waves
         transforms = np.fft.rfft(tapers * columns[a:b], axis=1)[:, inside]
-        out.append(Segment(log, frequency, weight, transforms))
+        out.append(Segment(log, (t[a], t[b - 1]), frequency, weight, transforms))
     return out
 
 

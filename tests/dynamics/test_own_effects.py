@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.outcomes import refused
 from tests.support.own_effects import HOSE, joined
-from tests.support.vehicles import VEHICLE
+from tests.support.vehicles import HOVER, POSE, VEHICLE
 from windwrench import _core
 from windwrench.dynamics import EffectSetting, effects
 from windwrench.dynamics.effects.base import (
@@ -53,12 +53,17 @@ def marker_offset(c, vehicle, sample, memory):
         sample.position += sample.direction * turned
 
 
+def felt_along(vehicle, state, damping, swing):
+    """What vehicle and load feel apart, m/s2: thrust, and the air along the load's way."""
+    felt = state.rotation[:, 2] * state.thrust.sum() / vehicle.mass
+    return felt + damping * (state.velocity + swing - state.wind)
+
+
 def slung_payload(c, vehicle, state, wrench):
     mass, length, damping = c[:3]
     started, n, rate = c[HIDDEN], c[HIDDEN + 1 : HIDDEN + 4], c[HIDDEN + 4 : HIDDEN + 7]
     n = n if started else np.array([0.0, 0.0, -1.0])
-    felt = state.rotation[:, 2] * state.thrust.sum() / vehicle.mass
-    felt = felt + damping * (state.velocity + length * rate - state.wind)
+    felt = felt_along(vehicle, state, damping, length * rate)
     tension = max((length * rate @ rate - n @ felt) / (1.0 / mass + 1.0 / vehicle.mass), 0.0)
     wrench.force += tension * n
     wrench.torque -= np.cross(vehicle.com, state.rotation.T @ (tension * n))
@@ -70,8 +75,7 @@ def advance(c, vehicle, state, rotors):
     if own[0] == 0.0:
         own[0], own[3] = 1.0, -1.0
     n, rate = own[1:4], own[4:7]
-    felt = state.rotation[:, 2] * state.thrust.sum() / vehicle.mass
-    felt = felt + damping * (state.velocity + length * rate - state.wind)
+    felt = felt_along(vehicle, state, damping, length * rate)
     pull = max(length * rate @ rate - n @ felt, 0.0)
     rate -= rotors.step * (felt + pull * n) / length
     n += rotors.step * rate
@@ -117,8 +121,6 @@ def test_an_effect_in_python_is_the_one_of_the_core(name):
 
 
 STARTS = "starting_points=lambda flights: [{'a': 0.2, 'w': 3.0}]"
-HOVER = np.full(4, VEHICLE.hover_rate)
-STILL = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
 SWAYING = EffectSetting("hose", {"a": 0.2, "w": 3.0})
 
 
@@ -137,13 +139,13 @@ SLIP = r"hose\.py, line 10: effect hose: AttributeError: no field velosity"
 
 def test_an_error_in_an_effect_is_one_line_after_the_step_and_the_filter_goes_on(hose):
     ukf = WrenchUKF(hose)
-    ukf.reset(*STILL)
+    ukf.reset(*POSE)
     for _ in range(20):
-        ukf.step(HOVER, *STILL)
+        ukf.step(HOVER, *POSE)
     with refused(SLIP):
-        ukf.step(HOVER, *STILL)
+        ukf.step(HOVER, *POSE)
     ukf.record["time"] = 0.0
-    assert np.isfinite(ukf.step(HOVER, *STILL).force).all()
+    assert np.isfinite(ukf.step(HOVER, *POSE).force).all()
 
 
 def test_an_error_in_an_effect_ends_a_flight_and_what_is_made_of_a_log(hose):

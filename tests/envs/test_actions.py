@@ -92,12 +92,11 @@ def test_observations_are_of_the_estimate_relative_to_the_reference():
     env, _, seen = flying("attitude", 0.4, [0.4, 0.0, 0.0, 0.0], observation="all", normalize=False)
     loop = env.loop
     row = env.many.episodes.references[0, 80]
-    assert_allclose(seen[:3], row[:3] - loop.state[:3], atol=1e-6)
-    assert_allclose(seen[3:6], -loop.state[7:10], atol=1e-6)
-    assert_allclose(seen[6:9], [0.2, 0.0, 0.0], atol=0.03)
-    assert_allclose(seen[9:12], loop.state[10:13], atol=1e-6)
-    assert_allclose(seen[12:15], loop.state[16:19], atol=1e-6)
-    assert_allclose(seen[15:18], loop.state[13:16], atol=1e-6)
+    turn = seen[6:9]
+    assert_allclose(turn, [0.2, 0.0, 0.0], atol=0.03)
+    position, _, velocity, rate, torque, force = np.split(loop.state[:19], [3, 7, 10, 13, 16])
+    expected = [*(row[:3] - position), *-velocity, *turn, *rate, *force, *torque]
+    assert_allclose(seen[:18], expected, atol=1e-6)
     assert_allclose(seen[18:24], [*loop.specific, *loop.thrust], rtol=1e-5)
     assert_allclose(seen[24:], [0.4, 0.0, 0.0, 0.0], rtol=1e-6)
     parts = {"pose": slice(0, 12), "wrench": slice(0, 18), "imu": [*range(12), *range(18, 24)]}

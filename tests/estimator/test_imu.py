@@ -207,9 +207,8 @@ def test_biases_are_found_and_cost_nothing():
 def test_the_first_gyro_sample_has_a_bias_whenever_it_comes(posed):
     """A rate is known no better than the bias of the gyro, whether or not a pose came before."""
     f = WrenchUKF(VEHICLE, UKFTuning(gyro_noise=0.005, gyro_bias_std=0.1), PERIOD)
-    pose = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
-    f.reset(*pose)
-    f.step(HOVER, *(pose if posed else (None, None)))
+    f.reset(*POSE)
+    f.step(HOVER, *(POSE if posed else (None, None)))
     e = f.correct_imu(np.zeros(3), None)
     assert (np.sqrt(np.diag(e.covariance)[3:6]) > 0.09).all()
 

@@ -148,12 +148,10 @@ def test_lost_held_and_wild_poses_change_little(fits):
     rng = default_rng(1)
     wild = rng.choice(len(t), len(t) // 100, replace=False)
     position[wild] += rng.uniform(-0.3, 0.3, (len(wild), 3))
-    position[700:760] = nan  # lost for 0.3 s
-    quaternion[700:760] = nan
-    position[1500:1700] = nan  # for 1 s: the filter starts anew
-    quaternion[1500:1700] = nan
-    position[2500:2560] = position[2499]  # held
-    quaternion[2500:2560] = quaternion[2499]
+    for pose in (position, quaternion):
+        pose[700:760] = nan  # lost for 0.3 s
+        pose[1500:1700] = nan  # for 1 s: the filter starts anew
+        pose[2500:2560] = pose[2499]  # held
     spoiled = fit_noise(VEHICLE, t, speeds, position, quaternion)
     assert 17 <= spoiled.outliers <= 42
     apart = (logarithms(spoiled.tuning) - logarithms(clean.tuning)) / clean.deviation
@@ -163,16 +161,14 @@ def test_lost_held_and_wild_poses_change_little(fits):
 
 
 def test_short_logs_work_or_are_refused_in_one_line():
-    t, speeds, position, quaternion = flight(seconds=3.0)
-    fit = fit_noise(VEHICLE, t, speeds, position, quaternion)
+    log = t, speeds, position, quaternion = flight(seconds=3.0)
+    fit = fit_noise(VEHICLE, *log)
     assert 300 < fit.after.poses <= 400
     assert 0.5 < fit.after.nis / 6.0 < 2.0
-    short = slice(0, 250)
-    with refused("expected at least 100") as caught:
-        fit_noise(VEHICLE, t[short], speeds[short], position[short], quaternion[short])
-    assert "\n" not in str(caught.value)
-    with refused("expected at least 100"):
-        consistency_of(VEHICLE, t[short], speeds[short], position[short], quaternion[short])
+    for use in (fit_noise, consistency_of):
+        with refused("expected at least 100") as caught:
+            use(VEHICLE, *(x[:250] for x in log))
+        assert "\n" not in str(caught.value)
     for spoil in (np.full_like(position, nan), np.tile(position[:1], (len(t), 1))):
         held = np.tile(quaternion[:1], (len(t), 1))
         with refused("0 of 600 rows"):

@@ -44,9 +44,8 @@ def samples():
     flights = [yawing_flight(VEHICLE, STEPS, seed=seed) for seed in range(COUNT)]
     rotors, position, quaternion = (np.stack([f[name] for f in flights], axis=1) for name in NAMES)
     rng = default_rng(0)
-    rotors[1:][rng.random((STEPS - 1, COUNT)) < 0.02] = nan
-    position[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = nan
-    quaternion[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = nan
+    for values, share in ((rotors, 0.02), (position, 0.1), (quaternion, 0.1)):
+        values[1:][rng.random((STEPS - 1, COUNT)) < share] = nan
     position[40:60, 2] = quaternion[40:60, 2] = nan
     position[70, 1] += 0.5  # an outlier
     position[15:, 4] += [2.0, 0.0, 0.0]  # a jump for good: a gate restarts the filter

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import excerpt
-from tests.support.outcomes import refused
+from tests.support.outcomes import noted, refused
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.evidence.measured_flights import compare, imu_check, linear_drag
 from windwrench.identification.diagnosis import diagnose
@@ -37,7 +37,7 @@ def test_a_nanobench_flight_lacks_the_lift_of_a_full_battery(name, logs):
     assert log.t[-1] == pytest.approx(18.0, abs=0.02)
     assert log.valid.all()
     assert 3.0 < log.voltage.min() < log.voltage.max() < 4.2  # V
-    assert any("voltage" in note for note in log.notes)
+    assert noted(log, "voltage")
     assert screen_log(log, VEHICLE)[1] == ()
     series = estimate_log(log, VEHICLE)
     settled = series.t > 2.0

@@ -14,9 +14,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from tests.support.flown import noisy, without_pose
+from tests.support.flown import noisy, resting, without_pose
 from tests.support.imu_flights import imu_flight, pose_removed
-from tests.support.outcomes import refused
+from tests.support.outcomes import noted, refused
 from tests.support.vehicles import VEHICLE
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.estimator import WrenchUKF
@@ -46,25 +46,17 @@ HEADER = ["t", *WRENCH, *(f"std_{name}" for name in WRENCH), "nis", "status"]
 
 def held_flight(t, lift=0.3, lost=None):
     """A vehicle at rest in the air while something carries ``lift`` N of its weight."""
-    rng = default_rng(0)
-    count = len(t)
-    speed = VEHICLE.hover_rate * np.sqrt(1 - lift / VEHICLE.weight)
-    pose = np.tile([0.5, -0.5, 1.0], (count, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-    position, quaternion = noisy(VEHICLE.mocap, rng, *pose)
-    valid = np.ones(count, dtype=bool)
-    if lost is not None:
-        valid[lost] = False
-    return FlightLog(
-        t=t,
-        position=np.where(valid[:, None], position, nan),
-        quaternion=np.where(valid[:, None], quaternion, nan),
-        rotor_speeds=np.full((count, 4), speed),
-        valid=valid,
+    log = resting(
+        t,
+        rotor_speeds=np.full((len(t), 4), VEHICLE.hover_rate * np.sqrt(1 - lift / VEHICLE.weight)),
         name="held",
         source="held.csv",
-        force=np.tile([0.0, 0.0, lift], (count, 1)),
-        torque=np.zeros((count, 3)),
+        force=np.tile([0.0, 0.0, lift], (len(t), 1)),
+        torque=np.zeros((len(t), 3)),
     )
+    position, quaternion = noisy(VEHICLE.mocap, default_rng(0), log.position, log.quaternion)
+    log = replace(log, position=position, quaternion=quaternion)
+    return log if lost is None else without_pose(log, lost)
 
 
 def finite(series):
@@ -269,7 +261,7 @@ def test_an_imu_alone_shows_a_vertical_force(flown):
     z = abs(series.force - flown.force)[inner] / series.std[inner, 15:]
     assert (z.mean(axis=0) < 2.0).all()
     assert np.isnan(series.nis).all()
-    assert any("no pose" in note for note in series.notes)
+    assert noted(series, "no pose")
 
 
 def test_an_imu_beside_the_pose_is_smoothed(flown):

@@ -118,6 +118,23 @@ def error_of(live, after=4.0):
     return float(rms(wrong[t - t[0] > after]))
 
 
+def followed(sender, ours, **how):
+    """The stream of a flight by a sender's kind and the kinds that are stamped: no pose comes too
+    late and none is lost.
+    """
+    flown = flight()
+    kind, stamped = sender
+    live = played(kind(flown), times_of(flown, ours, **how), stamped)
+    assert live.tallies.counts["too late"] == 0
+    assert len(live.outputs) >= 795  # the first poses wait for rotor speeds
+    return live
+
+
+def lasted(live):
+    """The stream's own time, s."""
+    return live.outputs[-1].t - live.outputs[0].t
+
+
 BOTH = (Json, ("motors", "pose"))
 POSES = (Json, ("pose",))
 MOTORS = (Json, ("motors",))
@@ -131,13 +148,9 @@ TELEMETRY = (Mavlink, ("pose",))  # rotor speeds are placed by poses
 )
 def test_a_simulator_of_any_rate_has_no_pose_too_late(sender, rate):
     """The filter's steps are the simulator's: so is the stream's time, and the force is right."""
-    flown = flight()
-    kind, stamped = sender
-    live = played(kind(flown), times_of(flown, lambda t: t / rate), stamped)
-    assert live.tallies.counts["too late"] == 0
+    live = followed(sender, lambda t: t / rate)
     assert live.session.watch.poses == 801
-    assert len(live.outputs) >= 795  # the first poses wait for rotor speeds
-    assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(8.0, abs=0.06)
+    assert lasted(live) == pytest.approx(8.0, abs=0.06)
     assert live.session.filter.restarts == 0
     assert error_of(live) < 0.04
     said = " ".join(live.tallies.news())
@@ -158,25 +171,16 @@ PAUSED = {
     ("sender", "pace"), [*zip((BOTH, TELEMETRY, TELEMETRY), PAUSED, strict=True)]
 )
 def test_a_clock_that_changes_its_rate_costs_no_pose(sender, pace):
-    flown = flight()
-    kind, stamped = sender
-    live = played(kind(flown), times_of(flown, PAUSED[pace]), stamped)
-    assert live.tallies.counts["too late"] == 0
-    assert len(live.outputs) >= 795
-    assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(8.0, abs=0.11)
+    live = followed(sender, PAUSED[pace])
+    assert lasted(live) == pytest.approx(8.0, abs=0.11)
     assert error_of(live) < 0.06
 
 
 @pytest.mark.parametrize(("sender", "in_order"), [(BOTH, True), (TELEMETRY, False)])
 def test_bursts_of_a_link_cost_no_pose(sender, in_order):
     """Nothing comes for up to 0.5 s, then all at once, of a simulator at 0.9 of real time."""
-    flown = flight()
-    kind, stamped = sender
     bursts = [(2.0, 2.5), (4.0, 4.2), (6.0, 6.1)]
-    times = times_of(flown, lambda t: t / 0.9, bursts=bursts, in_order=in_order)
-    live = played(kind(flown), times, stamped)
-    assert live.tallies.counts["too late"] == 0
-    assert len(live.outputs) >= 795
+    live = followed(sender, lambda t: t / 0.9, bursts=bursts, in_order=in_order)
     assert error_of(live) < 0.1
 
 
@@ -194,9 +198,9 @@ def test_a_sender_that_restarts_is_followed_after_20_messages(sender, rate):
     assert live.tallies.counts["clock jumps"] == 1
     assert live.tallies.counts["too late"] <= 3  # before the last ones of the old clock
     assert live.session.watch.too_late <= 1
-    lasted = max(20, 0.2 * rate * (200 * ("motors" in stamped) + 100 * ("pose" in stamped)))
-    assert live.tallies.counts["implausible times"] <= 1.2 * lasted
-    assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(8.0, abs=0.06)
+    doubted = max(20, 0.2 * rate * (200 * ("motors" in stamped) + 100 * ("pose" in stamped)))
+    assert live.tallies.counts["implausible times"] <= 1.2 * doubted
+    assert lasted(live) == pytest.approx(8.0, abs=0.06)
 
 
 @pytest.mark.parametrize("stamped", [("motors", "pose"), ("pose",)])
@@ -208,7 +212,7 @@ def test_another_sender_in_place_of_a_silent_one_is_another_clock_at_once(stampe
     assert live.tallies.found.keys() <= {"clock jumps", "late", "waiting"}
     assert live.tallies.counts["clock jumps"] == 1
     assert len(live.outputs) >= 795
-    assert live.outputs[-1].t - live.outputs[0].t == pytest.approx(10.5, abs=0.06)
+    assert lasted(live) == pytest.approx(10.5, abs=0.06)
 
 
 def test_where_poses_stop_the_estimate_goes_on_in_the_senders_time():

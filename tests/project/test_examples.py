@@ -58,6 +58,7 @@ def test_stable_baselines3_trains_on_the_plain_environment(example):
 
 @pytest.mark.measured
 def test_a_log_becomes_a_vehicle_and_two_controllers_in_c(example, monkeypatch):
+    """64 steps train nothing: the policy is lost in Python and in C."""
     pytest.importorskip("stable_baselines3", reason="pip install 'windwrench[rl]'")
     needs("g++")
     logs = data_file("crazyflie_imu/log15").parent

@@ -17,6 +17,7 @@ from windwrench.cli import app
 
 CHECKOUT_ONLY = ("evidence", "reproduction", "tests", "installation", "setup.py")
 MOST_BYTES = 4_000_000  # of the wheel
+ENVIRONMENT = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +64,7 @@ def installed(empty):
 
 
 def call(empty, folder, *arguments):
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    return done(empty / "windwrench", *arguments, cwd=folder, env=environment)
+    return done(empty / "windwrench", *arguments, cwd=folder, env=ENVIRONMENT)
 
 
 def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
@@ -99,9 +99,8 @@ def test_the_wheel_is_small(wheel):
 
 
 def test_the_paper_s_figures_need_a_checkout(empty, tmp_path):
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     words = [empty / "windwrench", "reproduce", "fig3"]
-    ended = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    ended = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
     assert ended.returncode == 2
     assert ended.stderr.startswith("error: reproduce: ")
     assert "checkout" in ended.stderr

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from tests.support.bad_inputs import table
+from tests.support.bad_inputs import table, write_file
 from tests.support.map_tables import hover_table
 from tests.support.paths import ROOT
 from tests.support.vehicles import HOVER, POSE, VEHICLE
@@ -37,18 +37,14 @@ def refusal(case, folder):
     batch of two, which the argument must leave as they were; ``file`` writes one into the folder.
     """
 
-    def file(name, content):
-        data = content.encode() if isinstance(content, str) else content
-        (folder / name).write_bytes(data)
-        return folder / name
-
     where, _, call = case.partition(": ")
     module = import_module(f"windwrench.{where}")
     started = {"begun": WrenchUKF(VEHICLE), "both": WrenchUKFBatch(VEHICLE, 2)}
     for one in started.values():
         one.reset(*POSE)
     before = [(one.estimate.state, one.covariance) for one in started.values()]
-    names = {name: getattr(module, name) for name in dir(module)} | GIVEN | started | {"file": file}
+    names = {name: getattr(module, name) for name in dir(module)} | GIVEN | started
+    names["file"] = lambda name, content: write_file(folder / name, content)
     with pytest.raises(InputError) as refused:
         eval(call, names)
     for one, (state, covariance) in zip(started.values(), before, strict=True):

@@ -95,12 +95,17 @@ def policies():
     )
 
 
+def write_file(path, content):
+    """Write a text, or bytes; return the path."""
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
 def write_bad_inputs(folder):
     """Write every file into a folder, beside the empty folder ``nothing``."""
     found = forms("vehicle", "v") | forms("map", "m") | KEPT["files"] | logs() | policies()
     mine = "".join(f"{k}: {v}\n" for k, v in KEPT["vehicle"].items())
     found |= {"mine.yaml": mine, "v_deep.yaml": "[" * 200 + "]" * 200}
     for name, content in found.items():
-        data = content.encode() if isinstance(content, str) else content
-        (folder / name).write_bytes(data)
+        write_file(folder / name, content)
     (folder / "nothing").mkdir()

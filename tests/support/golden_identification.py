@@ -15,7 +15,7 @@ from tests.support.flown import recorded
 from tests.support.paths import ROOT
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.comparison.change import compare
-from windwrench.identification.comparison.fault_channels import channels_of_log
+from windwrench.identification.comparison.fault_channels import samples_of
 from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.words import change_data, fault_data
 from windwrench.identification.vehicle_fit.exports import EXPORTS
@@ -77,8 +77,8 @@ def made():
         for moved in ((0.0, 0.0, 0.0, 0.0), (0.08, -0.08, 0.08, 0.08), (0.1, 0.0, 0.0, 0.1))
     }
     faults = {
-        "none": find_fault(channels_of_log(one)),
-        "rotor": find_fault(channels_of_log(failing_flight())),
+        "none": find_fault(samples_of(one)),
+        "rotor": find_fault(samples_of(failing_flight())),
     }
     return {
         "identified": {name: said(v) for name, v in vehicles().items()},

@@ -39,7 +39,8 @@ def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), sessions=1):
         for i in range(count):
             numbers = middle + np.array(FLIGHT_STD) * rng.standard_normal(4)
             thrust = solve(MIX, np.append(numbers[:3], 1.0)) * np.exp(numbers[3])
-            out.append(Trim(f"{session}, {i}", thrust, 20.0, np.zeros(4)))
+            total = thrust.sum()
+            out.append(Trim(f"{session}, {i}", 20.0, thrust / total, total, np.zeros(4)))
     return out
 
 
@@ -49,19 +50,20 @@ def test_flights_without_a_change_are_never_given_a_sure_one():
     found = [compare(drawn(rng, 1), drawn(rng, 2)) for _ in range(60)]
     assert sum(c.sure and c.place != NOWHERE for c in found) <= 1
     assert sum(c.place == NOWHERE for c in found) > 55
-    assert all(sum(c.places.values()) == pytest.approx(1.0) for c in found)
+    assert all(sum(c.probabilities.values()) == pytest.approx(1.0) for c in found)
 
 
 def stated(found):
-    """Return the deviations of a difference's four numbers, over its hypotheses."""
-    return np.sqrt(np.exp(found.log) @ found.variance)
+    """Return a difference's four numbers and their deviations, over its hypotheses."""
+    mean, variance, log = found
+    return np.exp(log) @ mean, np.sqrt(np.exp(log) @ variance)
 
 
 def test_more_sessions_make_an_answer_surer_and_more_flights_of_one_do_not():
     rng = default_rng(4)
     after = drawn(rng, 1, (0.06, -0.06, -0.06, 0.06))  # rotor 2 is asked for more
     one, more, apart = (
-        stated(difference(after, drawn(rng, count, sessions=sessions)))
+        stated(difference(after, drawn(rng, count, sessions=sessions)))[1]
         for count, sessions in ((1, 1), (6, 1), (1, 6))
     )
     assert (apart < 0.8 * one).all()
@@ -74,7 +76,7 @@ def test_a_session_ends_where_the_battery_was_changed():
 
     def std(volts):
         known = [replace(x, voltage=v) for x, v in zip(flights, volts, strict=True)]
-        return stated(difference([after], known))
+        return stated(difference([after], known))[1]
 
     assert (std([12.4, 12.0, 12.4, 12.0]) < 0.95 * std([12.4, 12.2, 12.0, 11.8])).all()
 
@@ -89,10 +91,10 @@ def test_a_named_session_is_one_and_what_it_is_off_by_cancels():
             if day == "tue":
                 first, second = drawn(rng, 2)
             before = [replace(trim, session="mon") for trim in before]
-            found = difference([replace(x, session=day) for x in (first, second)], before)
-            share = np.exp(found.log)
-            size = np.sqrt(share @ found.variance)
-            scores.append(share @ found.mean / size)
+            mean, size = stated(
+                difference([replace(x, session=day) for x in (first, second)], before)
+            )
+            scores.append(mean / size)
             assert (size < 2.5 * np.array(FLIGHT_STD)).all() == (day == "mon")
         assert 0.8 < rms(scores) < 1.2
 
@@ -153,10 +155,10 @@ def test_another_battery_voltage_makes_the_total_less_certain():
     rng = default_rng(7)
     after = drawn(rng, 3, (0.0, 0.0, 0.0, 0.13))
     before = drawn(rng, 3)
-    assert compare(after, before).places["all rotors"] > 0.8
+    assert compare(after, before).probabilities["all rotors"] > 0.8
     low = [replace(trim, voltage=10.5) for trim in after]
     high = [replace(trim, voltage=12.0) for trim in before]
-    assert compare(low, high).places["all rotors"] < 0.7
+    assert compare(low, high).probabilities["all rotors"] < 0.7
 
 
 @pytest.mark.measured

@@ -14,47 +14,44 @@ from tests.support.data_paths import data_file
 from tests.support.golden_identification import failing_flight
 from tests.support.outcomes import refused
 from windwrench.cli import app
-from windwrench.identification.comparison.fault_channels import Channels, channels_of_log, sample
+from windwrench.identification.comparison.fault_channels import sample, samples_of
 from windwrench.identification.logs.channels import Stream
 
 
-def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
+def hover(seconds=8.0, rate=200.0, **changed):
     rng = default_rng(0)
     t = np.arange(0.0, seconds, 1.0 / rate)
-    u = np.arange(0.0, seconds, 1.0 / command_rate)
     streams = {
         "gyro": 0.01 * rng.standard_normal((len(t), 3)),
         "accelerometer": np.tile([0.0, 0.0, 9.81], (len(t), 1)),
-        "command": np.full((len(u), 4), 0.4),
+        "commands": np.full((len(t), 4), 0.4),
     } | changed
-    times = {"command": u}
-    return Channels("hover.csv", *(Stream(k, times.get(k, t), x) for k, x in streams.items()))
+    return sample("hover.csv", **{k: Stream(k, t, x) for k, x in streams.items()})
 
 
 def test_nothing_is_read_behind_a_clipped_gyro_or_an_impact():
     t = np.arange(0.0, 8.0, 0.005)
     clipped, turning = np.zeros((2, len(t), 3))
     clipped[:, 0] = np.clip(40.0 * (t - 6.0), 0.0, np.radians(500.0))
-    samples = sample(hover(gyro=clipped))
+    samples = hover(gyro=clipped)
     assert samples.ended == "the gyro was at its limit"
     assert samples.t[-1] == pytest.approx(6.0 + 8.73 / 40.0, abs=0.03)
     hit = np.tile([0.0, 0.0, 9.81], (len(t), 1))
     hit[t > 7.0, 1] = 90.0
-    samples = sample(hover(accelerometer=hit))
+    samples = hover(accelerometer=hit)
     assert samples.ended == "the vehicle hit something"
     assert samples.t[-1] < 7.0
     turning[:, 2] = 2.0  # a steady turn is no clipped gyro
-    assert sample(hover(gyro=turning)).ended == ""
+    assert hover(gyro=turning).ended is None
 
 
 def test_what_cannot_show_a_fault_is_refused():
-    with refused(r"hover\.csv: 0 s in flight; expected at least 3 s"):
-        sample(hover(seconds=1.4))
-    with refused("fewer than ten samples"):
-        sample(hover(seconds=0.04))
+    for seconds, rate in ((1.4, 200.0), (0.04, 200.0), (8.0, 8.0)):
+        with refused(r"hover\.csv: 0 s in flight .* expected at least 3 s without a gap of 0\.1 s"):
+            hover(seconds, rate)
     for absent in ("gyro", "accelerometer"):
-        with refused("no gyro or no accelerometer"):
-            channels_of_log(replace(failing_flight(), **{absent: None}))
+        with refused(f"no {absent}; expected all of gyro, accelerometer and motor commands"):
+            samples_of(replace(failing_flight(), **{absent: None}))
 
 
 @pytest.mark.measured

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.outcomes import noted
 from tests.support.vehicles import VEHICLE
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import Need, needing
@@ -34,9 +35,8 @@ def test_a_factor_on_thrust_from_commands_alone_is_never_sure():
         assert other in effect.indistinguishable_from
         size = UNSTATED_THRUST_STD * (VEHICLE.mass if effect.name == "mass" else 1.0)
         assert all(std >= size for std in effect.std.values())
-        assert any(
-            note.startswith(f"{effect.name}: the log holds motor commands") for note in found.notes
-        )
+        assert found.probabilities.names[effect.name] < 0.5  # of 5 beside 30 %
+        assert noted(found, f"{effect.name}: the log holds motor commands")
     assert found.verdict == "partly explained"
     assert headline(found).startswith("The model perhaps lacks ")
 
@@ -57,8 +57,8 @@ def test_names_behind_a_filter_are_the_same_but_tentative(name, filtered, coeffi
     assert found.verdict == "partly explained"
     assert "perhaps" in headline(found)
     assert found.advice[0].startswith("Log the pose as it was measured")
-    assert any("position and attitude were filtered" in note for note in found.notes)
-    assert any("the filter of the pose delays it" in note for note in found.notes)
+    assert noted(found, "position and attitude were filtered")
+    assert noted(found, "the filter of the pose delays it")
     (effect,) = (e for e in found.effects if e.name == name)
     for key, value in coefficients.items():
         assert abs(effect.coefficients[key] - value) < max(4.0 * effect.std[key], 0.15 * abs(value))
@@ -71,9 +71,7 @@ def test_a_filters_delay_is_no_late_motor():
     )
     assert not [e for e in found.effects if not e.tentative]
     assert not needing(Need.FAST_MOTION) & {e.name for e in found.effects}
-    assert any(
-        "later than they are logged, or the filter of the pose delays it" in n for n in found.notes
-    )
+    assert noted(found, "later than they are logged, or the filter of the pose delays it")
 
 
 def test_a_wash_that_passes_now_and_then_is_found_where_it_was():

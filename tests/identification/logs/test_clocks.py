@@ -81,9 +81,8 @@ def boots():
     return dataflash([parm(), imu(t), (name, letters, columns)])
 
 
-def test_of_two_boots_the_longest_is_read_or_the_one_that_is_asked_for(tmp_path):
-    path = tmp_path / "two.BIN"
-    path.write_bytes(boots())
+def test_of_two_boots_the_longest_is_read_or_the_one_that_is_asked_for(write):
+    path = write(boots(), "two.BIN")
     log = read_log(path)
     assert len(log.t) == 400
     assert noted(log, "2 pieces of 3.98, 7.98 s; piece 2 was read")

@@ -13,7 +13,7 @@ from tests.support.hostile_conventions import (
     framed,
     permuted,
 )
-from tests.support.outcomes import refused
+from tests.support.outcomes import noted, refused
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.clocks import on_one_clock
 from windwrench.identification.logs.flight_log import with_rows
@@ -38,7 +38,7 @@ def test_rounded_rotor_speeds_of_a_smooth_flight_come_with_each_row():
 def mended_log():
     """A log of a late IMU, mended."""
     log = read_log(data_file("hard_logs/imu_clock_late.csv.gz"), vehicle=load_vehicle("ardrone2"))
-    assert any("the IMU is 0.119 s late" in note for note in log.notes)  # 0.12 s
+    assert noted(log, "the IMU is 0.119 s late")  # 0.12 s
     return with_rows(log, np.isfinite(log.gyro[:, 0]))
 
 

@@ -9,6 +9,7 @@ import yaml
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
+from tests.support.outcomes import noted
 from tests.support.random_tables import fields_of, flight, random_table, save
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs import map_guess
@@ -19,6 +20,7 @@ from windwrench.identification.logs.magnitudes import motor_unit
 from windwrench.identification.logs.map_guess import guess_map
 from windwrench.identification.logs.map_text import map_yaml
 from windwrench.identification.logs.mapped_log import map_table
+from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.text_table import open_table
 
 
@@ -78,8 +80,13 @@ def table_of(columns, path):
 _QUATERNION = "qw qx qy qz"
 _SENSORS = "vx vy vz ax ay az gx gy gz"
 NAMES = f"t x y z {_QUATERNION} {_SENSORS} "  # and four motors behind
-_PX4 = "/fmu/out/vehicle_odometry"
-_VICON = "/vicon/drone/transform"
+_PX4 = "/fmu/out/"
+_VICON = "/vicon/drone/transform/"
+
+
+def each(stem, ends):
+    """Return the names of columns that differ in their last letter."""
+    return " ".join(stem + end for end in ends)
 
 
 @pytest.mark.parametrize(
@@ -89,19 +96,14 @@ _VICON = "/vicon/drone/transform"
         f"t x_ned y_ned z_ned {_QUATERNION} {_SENSORS} motor_0 motor_1 motor_2 motor_3",
         f"t px py pz {_QUATERNION} vx vy vz ax ay az angular_velocities_0 angular_velocities_1 "
         "angular_velocities_2 w1 w2 w3 w4",
-        " ".join(
-            ["__time", *(f"{_VICON}/translation/{a}" for a in "xyz")]
-            + [f"{_VICON}/rotation/{a}" for a in "wxyz"]
-            + [_SENSORS, *(f"/motors/angular_velocities_{i}" for i in range(4))]
-        ),
-        " ".join(
-            ["__time", *(f"{_PX4}/position.{i:02d}" for i in range(3))]
-            + [f"{_PX4}/q.{i:02d}" for i in range(4)]
-            + [f"{_PX4}/velocity.{i:02d}" for i in range(3)]
-            + [f"/fmu/out/sensor_combined/accelerometer_m_s2.{i:02d}" for i in range(3)]
-            + [f"/fmu/out/sensor_combined/gyro_rad.{i:02d}" for i in range(3)]
-            + [f"/fmu/out/esc_status/rotor_speed.{i:02d}" for i in range(4)]
-        ),
+        f"__time {each(_VICON + 'translation/', 'xyz')} {each(_VICON + 'rotation/', 'wxyz')} "
+        f"{_SENSORS} {each('/motors/angular_velocities_', '0123')}",
+        f"__time {each(_PX4 + 'vehicle_odometry/position.0', '012')} "
+        f"{each(_PX4 + 'vehicle_odometry/q.0', '0123')} "
+        f"{each(_PX4 + 'vehicle_odometry/velocity.0', '012')} "
+        f"{each(_PX4 + 'sensor_combined/accelerometer_m_s2.0', '012')} "
+        f"{each(_PX4 + 'sensor_combined/gyro_rad.0', '012')} "
+        f"{each(_PX4 + 'esc_status/rotor_speed.0', '0123')}",
         "time_s uav_x_place uav_y_place uav_z_place uav_w_turn uav_x_turn uav_y_turn uav_z_turn "
         f"{_SENSORS} rotor1_rate rotor2_rate rotor3_rate rotor4_rate",
         "c%",  # names that say nothing: the numbers do
@@ -189,7 +191,9 @@ def test_what_a_pilot_or_a_controller_wants_is_no_part(tmp_path, flown):
 
 
 def test_motion_capture_with_y_up(tmp_path, flown):
-    """As OptiTrack writes poses: y up in the world and in the body, millimetres, w last."""
+    """As OptiTrack writes poses: y up in the world and in the body, millimetres, w last. A table
+    whose guess leaves no doubt is read at once.
+    """
     x, y, z = 1e3 * flown.position.T
     w, qx, qy, qz = flown.quaternion.T
     columns = {"Frame": np.arange(len(flown.t)), "Time (Seconds)": flown.t}
@@ -201,7 +205,9 @@ def test_motion_capture_with_y_up(tmp_path, flown):
     found = guessed(path, "ardrone2")
     assert not found.doubts
     assert (found.log_map.world, found.log_map.body) == ("y_up", "y_up")
-    log = map_table(open_table(path), found.log_map)
+    log = read_log(path, vehicle=load_vehicle("ardrone2"))
+    assert noted(log, "guessed without a doubt")
+    assert_allclose(log.rotor_speeds, flown.rotor_speeds, atol=1e-6)
     assert_allclose(log.position, flown.position, atol=1e-9)
     alike = abs(np.sum(log.quaternion * flown.quaternion, axis=1))
     assert_allclose(alike, 1.0, atol=1e-9)

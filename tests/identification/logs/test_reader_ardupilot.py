@@ -45,11 +45,9 @@ def esc(t):
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(write):
     def of_messages(*messages, vehicle=None):
-        path = tmp_path / "00000001.BIN"
-        path.write_bytes(dataflash(messages))
-        return read_log(path, None, vehicle)
+        return read_log(write(dataflash(messages)), None, vehicle)
 
     return of_messages
 
@@ -176,7 +174,7 @@ def test_frame_types_number_their_motors(read, kind, order):
     ],
 )
 def test_what_is_missing_is_named(read, messages, expected):
-    with refused(f"00000001.BIN: .*{expected}"):
+    with refused(f"log03: .*{expected}"):
         read(*messages)
 
 

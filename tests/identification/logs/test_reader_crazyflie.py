@@ -44,16 +44,6 @@ def slow(t):
 IMU = sd_card({"imu": (T, fast(T))})
 
 
-@pytest.fixture
-def write(tmp_path):
-    def to_file(data, name="log03"):
-        path = tmp_path / name
-        path.write_bytes(data)
-        return path
-
-    return to_file
-
-
 @pytest.mark.parametrize("version", [1, 2])
 def test_events_of_several_rates(write, version):
     log = read_log(write(sd_card({"imu": (T, fast(T)), "pose": (SLOW, slow(SLOW))}, version)))
@@ -155,16 +145,14 @@ def test_events_are_counted(write, monkeypatch):
 
 
 @pytest.mark.parametrize(("time", "unit"), [("timestamp", 1e3), ("Timestamp", 1e3), ("t", 1.0)])
-def test_a_table_of_log_variables(tmp_path, time, unit):
+def test_a_table_of_log_variables(write, time, unit):
     """As cflib's examples write them: blocks of two rates, empty where one has no sample."""
     columns = {time: unit * T[::2]}
     columns |= {key[:-3]: values for key, values in fast(T[::2]).items()}
     for key, values in slow(T[::10]).items():
         columns[key[:-3]] = np.full(len(T[::2]), np.nan)
         columns[key[:-3]][::5] = values
-    path = tmp_path / "cf.csv"
-    path.write_bytes(table_text(columns).replace(b"nan", b""))
-    log = read_log(path)
+    log = read_log(write(table_text(columns).replace(b"nan", b""), "cf.csv"))
     assert "reader crazyflie_csv" in log.source
     assert_motion(log, log.t[log.valid] + T[0], 3e-3, 3e-3)
     assert_allclose(log.command[0], OURS / 65535, atol=1e-6)

@@ -55,11 +55,9 @@ def onboard(t):
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(write):
     def of_topics(topics, parameters=None, vehicle=VEHICLE):
-        path = tmp_path / "flight.ulg"
-        path.write_bytes(ulog_bytes(topics, parameters))
-        return read_log(path, None, vehicle)
+        return read_log(write(ulog_bytes(topics, parameters)), None, vehicle)
 
     return of_topics
 
@@ -252,5 +250,5 @@ LONG = odometry(T) | {"float q": 2 * odometry(T)["float q"]}
     ],
 )
 def test_what_is_missing_is_named(read, topics, parameters, expected):
-    with refused(f"flight.ulg: .*{expected}"):
+    with refused(f"log03: .*{expected}"):
         read(topics, parameters)

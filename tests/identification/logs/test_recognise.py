@@ -3,13 +3,10 @@
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 
-from tests.support.data_paths import DATA
-from tests.support.outcomes import noted, refused
-from windwrench.dynamics import InputError, load_vehicle
+from tests.support.outcomes import refused
+from windwrench.dynamics import InputError
 from windwrench.identification.logs.reading import (
     READERS,
     find_reader,
@@ -17,7 +14,6 @@ from windwrench.identification.logs.reading import (
     reader_by_columns,
     reader_by_content,
 )
-from windwrench.identification.logs.tables import write_csv
 
 BEGINNINGS = {
     b"ULog\x01\x12\x35\x01": "px4_ulog",
@@ -65,23 +61,3 @@ def test_a_table_that_fits_two_readers_is_refused():
     header = [*find_reader("racer").signature, *find_reader("nanobench").signature]
     with refused("--reader nanobench or --reader racer"):
         reader_by_columns(Path("a.csv"), header)
-
-
-def test_a_table_whose_guess_leaves_no_doubt_is_read_at_once(tmp_path):
-    path = DATA / "flights" / "labelled_01.csv.gz"
-    if not path.exists():
-        pytest.skip(f"{path} is not here")
-    log = read_log(path)
-    vehicle = load_vehicle(DATA / "flights" / "vehicle.yaml")
-    down = [1.0, -1.0, -1.0]
-    columns = {
-        "time_ms": 1e3 * log.t,
-        **dict(zip("xyz", (log.position * down).T, strict=True)),
-        **dict(zip(("qw", "qx", "qy", "qz"), (log.quaternion * [1.0, *down]).T, strict=True)),
-        **{f"rpm{i + 1}": w * 60.0 / (2.0 * np.pi) for i, w in enumerate(log.rotor_speeds.T)},
-    }
-    write_csv(columns, tmp_path / "theirs.csv")
-    read = read_log(tmp_path / "theirs.csv", vehicle=vehicle)
-    assert noted(read, "guessed without a doubt")
-    assert_allclose(read.position, log.position, atol=1e-9)
-    assert_allclose(read.rotor_speeds, log.rotor_speeds, atol=1e-6)

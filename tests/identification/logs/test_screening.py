@@ -48,10 +48,15 @@ def flight(trajectory="excite", effect=None, size=2.0, seconds=14.0):
 
 
 @pytest.mark.parametrize(
-    ("trajectory", "step"),
-    [(CLEAN[0], 5), *(pytest.param(name, 1, marks=pytest.mark.slow) for name in CLEAN)],
+    ("trajectory", "step", "named"),
+    [
+        (CLEAN[0], 5, None),
+        pytest.param(CLEAN[0], 1, None, marks=pytest.mark.slow),
+        # calm flights name less likely ones, too
+        *(pytest.param(name, 1, 1, marks=pytest.mark.slow) for name in CLEAN[1:]),
+    ],
 )
-def test_every_order_of_rotors_is_told_apart(trajectory, step):
+def test_every_order_of_rotors_is_told_apart(trajectory, step, named):
     log = flight(trajectory)
     for order in list(permutations(range(4)))[::step]:
         for mirrored in (False, True):
@@ -60,7 +65,12 @@ def test_every_order_of_rotors_is_told_apart(trajectory, step):
             found = log_ranking(evidence).departures()
             rotors = tuple(i + 1 for i in order)
             expected = [] if rotors == (1, 2, 3, 4) and not mirrored else [(rotors, mirrored)]
-            assert [(reading.rotors, reading.mirrored) for reading in found] == expected
+            if mirrored and rotors in ((2, 3, 4, 1), (4, 1, 2, 3)):
+                # the same log as of body axes turned by 90 degrees: one departure in place of two
+                expected.insert(0, ((1, 2, 3, 4), False))
+                assert "degrees about z" in found[0].says
+            read = [(reading.rotors, reading.mirrored) for reading in found]
+            assert read[:named] == expected[:named]
 
 
 def test_rotors_that_work_against_a_cord_turn_as_declared():

@@ -20,13 +20,11 @@ AXES = ("roll_rad", "pitch_rad", "yaw_rad")
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(write):
     """Read a hover by a map; golden lines say what is refused of one."""
 
     def read_table(name, vehicle=None, **given):
-        path = tmp_path / "log.csv"
-        path.write_bytes(hover_table(name, **given))
-        return read_log(path, None, vehicle)
+        return read_log(write(hover_table(name, **given), "log.csv"), None, vehicle)
 
     return read_table
 

@@ -32,8 +32,8 @@ PLUS = replace(ARDRONE, rotor_positions=ARM * np.array(ENDS))
 
 
 @pytest.fixture
-def px4(tmp_path):
-    def write(outputs, connected=1, **parameters):
+def px4(write):
+    def of_outputs(outputs, connected=1, **parameters):
         sent = np.zeros((len(T), 16))
         sent[:, : outputs.shape[1]] = outputs
         battery = {
@@ -46,11 +46,9 @@ def px4(tmp_path):
             "sensor_combined": sensor_combined(T),
             "battery_status": battery,
         }
-        path = tmp_path / "flight.ulg"
-        path.write_bytes(ulog_bytes(topics, parameters))
-        return path
+        return write(ulog_bytes(topics, parameters))
 
-    return write
+    return of_outputs
 
 
 @pytest.mark.parametrize(
@@ -123,8 +121,8 @@ def test_a_check_shows_what_flew(px4):
 
 
 @pytest.fixture
-def ardupilot(tmp_path):
-    def write(texts=(), columns="C", count=4, **parameters):
+def ardupilot(write):
+    def of_pulses(texts=(), columns="C", count=4, **parameters):
         frames = {"FRAME_CLASS": None, "FRAME_TYPE": None}
         pulses = {f"{columns}{i + 1}": PULSES[:, i] for i in range(count)}
         rows = {"TimeUS": np.round(1e6 * T), **pulses}
@@ -132,11 +130,9 @@ def ardupilot(tmp_path):
         for text in texts:
             padded = text.encode().ljust(16, b"\0")
             messages.append(("MSG", "QN", {"TimeUS": [1.0], "Message": [padded]}))
-        path = tmp_path / "00000001.BIN"
-        path.write_bytes(dataflash(messages))
-        return path
+        return write(dataflash(messages))
 
-    return write
+    return of_pulses
 
 
 @pytest.mark.parametrize(
@@ -181,40 +177,33 @@ def test_rotors_are_found_by_their_directions():
     assert order_by_places([(1.0, 1.0)] * 4) is None
 
 
-def test_a_decoded_blackbox_of_six_motors_and_of_ten_times_the_volts(tmp_path):
+def test_a_decoded_blackbox_of_six_motors_and_of_ten_times_the_volts(write):
     columns = {"time (us)": 1e6 * T, "vbatLatest (V)": 227.0}
     columns |= {f"{name}[{i}]": 0.0 for name in ("gyroADC", "accSmooth") for i in range(3)}
     columns |= {"accSmooth[2]": 2048.0}
     columns |= {f"motor[{i}]": 48 + 2000 * SHARES[:, i] for i in range(6)}
-    path = tmp_path / "log.csv"
-    path.write_bytes(table_text(columns))
     with refused(r"6 rotors turn \(motor\[0\], .*motor\[5\]\); expected"):
-        read_log(path)
+        read_log(write(table_text(columns), "log.csv"))
     del columns["motor[4]"], columns["motor[5]"]
-    path.write_bytes(table_text(columns))
-    log = read_log(path)
+    log = read_log(write(table_text(columns), "log.csv"))
     assert log.voltage[0] == pytest.approx(22.7)
     assert noted(log, "taken as a tenth")
 
 
-def test_voltages_of_no_battery_are_left_out(tmp_path):
+def test_voltages_of_no_battery_are_left_out(write):
     columns = {"t": T, "px": T, "py": T, "pz": T, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
     columns |= {f"omega{i}": 400 + T for i in range(1, 5)}
     columns["vbat"] = np.where(np.arange(len(T)) == 50, 227.0, 11.1)
-    path = tmp_path / "log.csv"
-    path.write_bytes(table_text(columns))
-    log = read_log(path)
+    log = read_log(write(table_text(columns), "log.csv"))
     assert_allclose(log.voltage, 11.1)
     assert noted(log, "1 of 300 voltages, 227 to 227 V, are none of a")
 
 
-def test_a_log_of_motor_requests_alone_serves_to_compare(tmp_path):
+def test_a_log_of_motor_requests_alone_serves_to_compare(write):
     """As CrazyPAD's SD-card logs: no pitch, no gyro, no accelerometer."""
     motors = {f"motor.m{i + 1}(H)": (65535 * SHARES[:, i]).astype(int) for i in range(4)}
     place = {f"stateEstimate.{axis}(f)": np.sin(T) for axis in "xyz"}
-    path = tmp_path / "log00"
-    path.write_bytes(sd_card({"fixedFrequency": (T, motors | place)}))
-    log = read_log(path)
+    log = read_log(write(sd_card({"fixedFrequency": (T, motors | place)})))
     assert not log.has_pose
     assert_allclose(log.command, SHARES[:, [3, 2, 1, 0]], atol=1e-4)
     assert noted(log, "how the rotors share the work, and nothing else")
