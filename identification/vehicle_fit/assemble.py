@@ -47,11 +47,9 @@ def vehicle_of(
         if e.status == IDENTIFIED and not e.low < 0.0 < e.high
     }
     if model.commands:
-        thrust = np.zeros(max(model.exponents) + 1)
-        thrust[[*model.exponents]] = [fit.values[f"a{j}"] for j in range(len(model.exponents))]
+        thrust = tuple(fit.values.get(f"a{e}", 0.0) for e in range(3))
         voltage = estimates["voltage_exponent"]
-        exponent = voltage.value if voltage.status == IDENTIFIED else 0.0
-        curve = MotorCurve(tuple(thrust.tolist()), exponent)
+        curve = MotorCurve(thrust, voltage.value if voltage.status == IDENTIFIED else 0.0)
         k = model.weight / (4.0 * HOVER_SPEED**2)
     else:
         k = estimates["k"].value

@@ -38,6 +38,7 @@ class BalanceSpectra(NamedTuple):
     """
 
     pieces: Pieces
+    model: Model
     centre: NamedNumbers  # nonlinear parameters: the columns are linear about them
     names: Names  # columns; the rotors' are the last
     rotors: int  # the number of these
@@ -45,12 +46,12 @@ class BalanceSpectra(NamedTuple):
     seconds: float
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
-    def combined(self, model: Model, theta: Array) -> Array:
+    def combined(self, theta: Array) -> Array:
         """Return the residual as a combination (6, 1 + ...) of a measured axis and all
         columns.
         """
-        values = model.values(theta)
-        gains = coefficients(model, values, self.names)
+        values = self.model.values(theta)
+        gains = coefficients(self.model, values, self.names)
         late = gains[:, -self.rotors :]
         moved = (late * (values[name] - x) for name, x in self.centre.items())
         return np.column_stack([np.ones(6), -gains, *(-x for x in moved)])
@@ -67,10 +68,10 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
         air, rotors = air_columns(piece, model), rotor_columns(piece, model, centre)
         base = np.column_stack([*rotors.values()])
         parts = [np.nan_to_num(piece.measured()), *air.values(), base]
-        for name in [name for name in centre if name in _STEP]:
-            there = centre | {name: centre[name] + _STEP[name]}
-            moved = np.column_stack([*rotor_columns(piece, model, there).values()])
-            parts.append((moved - base) / _STEP[name])
+        for name, step in _STEP.items():
+            if name in centre:
+                there = rotor_columns(piece, model, centre | {name: centre[name] + step})
+                parts.append((np.column_stack([*there.values()]) - base) / step)
         stacked = low_pass(np.column_stack(parts), model.band, piece.period)
         for s in segments_of(stacked[inner], piece.t[inner], piece.period, piece.log, model.band):
             turn = -2j * np.pi * s.frequency[:, None]
@@ -82,12 +83,13 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
     names = (*air, *rotors)
     # white noise of each rotor's speed in a column: standard deviation times the root of the period
     noise = np.zeros((4, len(names)))
-    if model.speed_noise > 0.0 and centre.get("lag", 0.0) <= 0.0:
-        squares = [p.period * (4.0 * np.square(p.rotors)).mean(axis=0) for p in pieces]
+    if centre.get("lag", 0.0) <= 0.0:
+        squares = [p.period * (4.0 * p.rotors**2).mean(axis=0) for p in pieces]
         size = model.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
         for letter, share in model.shares.items():
-            noise[:, names.index(f"{letter}0")] = size * share
-    return BalanceSpectra(pieces, centre, names, len(rotors), tuple(segments), seconds.sum(), noise)
+            noise[:, names.index(f"{letter}2")] = size * share
+    sizes = len(rotors), tuple(segments), seconds.sum()
+    return BalanceSpectra(pieces, model, centre, names, *sizes, noise)
 
 
 def rotor_columns(piece: MotionPiece, model: Model, values: Values) -> NamedArrays:
@@ -97,13 +99,12 @@ def rotor_columns(piece: MotionPiece, model: Model, values: Values) -> NamedArra
     if model.voltage_ref > 0.0 and piece.voltage is not None:
         battery = np.power(piece.voltage / model.voltage_ref, values.get("gamma", 0.0))
     out: NamedArrays = {}
-    for j, exponent in enumerate(model.exponents):
+    for exponent in model.exponents:
         thrust = speed**exponent * battery[:, None]
         for letter, share in model.shares.items():
-            out[f"{letter}{j}"] = thrust @ share
+            out[name := f"{letter}{exponent}"] = thrust @ share
             if letter != "T":
-                slow = low_pass(out[f"{letter}{j}"], ANSWERED_HZ, piece.period)
-                out[f"slow {letter}{j}"] = slow
+                out[f"slow {name}"] = low_pass(out[name], ANSWERED_HZ, piece.period)
     momentum, w = speed @ model.spin, piece.angular_velocity
     smooth = low_pass(momentum, 2.0 * BAND, piece.period)
     out["Mz Jr"] = -derivative(smooth[:, None], piece.period)[:, 0]

@@ -3,7 +3,7 @@ of quantities missing from the flight.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -23,9 +23,9 @@ UNIT: Interval = (1.0, 1.0, 1.0)
 Estimates = Iterator[Estimate]
 
 
-def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
+def thrust_of(values: Values, u: float) -> float:
     """Return one rotor's thrust (N) at a speed in rad/s or a command."""
-    return sum(values[f"a{j}"] * u**e for j, e in enumerate(exponents))
+    return sum(values.get(f"a{e}", 0.0) * u**e for e in range(3))
 
 
 def _times(known: Interval, by: Interval | float) -> Interval:
@@ -69,18 +69,18 @@ def _positive(fit: VehicleFit, name: str, what: str | Function, unit: str, how: 
 
 def _thrust(fit: VehicleFit) -> Estimates:
     """Yield the thrust coefficient, or the curve of commands."""
-    of, exponents, pieces = fit.model.sources, fit.model.exponents, fit.balance.pieces
+    of, pieces = fit.model.sources, fit.balance.pieces
     how = f"{of.force} along body z against {of.rotors}, with the mass given"
     if not fit.model.commands:
-        yield _positive(fit, "k", "a0", "N/(rad/s)^2", how)
+        yield _positive(fit, "k", "a2", "N/(rad/s)^2", how)
         return
-    for j, e in enumerate(exponents):
-        yield _estimate(f"thrust u^{e}", fit.interval(f"a{j}", False), "N", how)
+    for e in fit.model.exponents:
+        yield _estimate(f"thrust u^{e}", fit.interval(f"a{e}", False), "N", how)
     flown = np.concatenate([p.rotors for p in pieces])
     low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
     beyond = f"continues the curve beyond the commands flown, {low:.2f} to {high:.2f}"
     for u in (0.25, 0.5, 0.75, 1.0):
-        name, thrust = f"thrust({u:g})", partial(thrust_of, exponents=exponents, u=u)
+        name, thrust = f"thrust({u:g})", partial(thrust_of, u=u)
         if low <= u <= high:
             yield _positive(fit, name, thrust, "N", how)
         else:
@@ -90,7 +90,7 @@ def _thrust(fit: VehicleFit) -> Estimates:
         weight = fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
 
         def excess(u: float) -> float:
-            return 4.0 * thrust_of(values, exponents, u) - weight
+            return 4.0 * thrust_of(values, u) - weight
 
         # a curve of few flights may carry the weight at no command, or at none up to 2
         low, high = excess(0.0), excess(2.0)
@@ -187,7 +187,7 @@ def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
         how = f"{how}, with the Jzz that is assumed"
     else:
         ratio, status = _times(fit.interval("reach"), arm), IDENTIFIED
-        product = fit.interval(lambda v: v["reach"] * v["a0"])
+        product = fit.interval(lambda v: v["reach"] * v["a2"])
     yield _estimate("p/k", ratio, "m", how, status=status)
     if k is not None:
         yield _estimate("p", product or _times(ratio, k.value), "Nm/(rad/s)^2", how, status=status)

@@ -261,7 +261,7 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
         fits = (_aligned(solve(pieces, model, np.array(x))) for x in starts)
         fit = min(fits, key=lambda f: f.loss)
         cost = fit.loss + _cost(fit, len(exponents))
-        thrust = [thrust_of(fit.values, exponents, u) for u in np.linspace(0.05, 1.0, 20)]
+        thrust = [thrust_of(fit.values, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
         if rises and (best is None or cost < best[0]):
             best, lags = (cost, fit), [fit.values["lag"]]
@@ -301,10 +301,10 @@ def _hover_thrust(fit: VehicleFit) -> Pair:
     """Return thrust as a share of the weight, at the hover speed or command of the fit's start, and
     its relative standard deviation.
     """
-    exponents, weight = fit.model.exponents, fit.model.weight
+    weight = fit.model.weight
     # the start's curve carries the weight here; each power carries its share
-    u = (weight / (4.0 * fit.model.scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
-    value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, exponents, u) / weight, False)
+    u = math.sqrt(weight / (4.0 * fit.model.scale["a2"]))
+    value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, u) / weight, False)
     return value, (value - low) / (fit.width * max(abs(value), 1e-9))
 
 
@@ -344,7 +344,7 @@ def _with_optional(fit: VehicleFit) -> VehicleFit:
         name = max(falls, key=falls.__getitem__)
         if falls[name] <= 0.0:
             if "flapping" in tests:
-                _, (value,), (size,) = tests["flapping"]
+                _, value, size = fit.model.scale["flapping"] * np.hstack(tests["flapping"])
                 hidden = value, size, math.sqrt(_cost(fit, 1)) * size
             break
         richer = solve(fit.balance.pieces, *fit.model.with_more(fit.theta, *offered.pop(name)))

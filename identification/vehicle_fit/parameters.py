@@ -4,6 +4,7 @@ by axis, with every coefficient linear.
 
 import math
 from collections import ChainMap
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -68,9 +69,9 @@ def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, A
     columns = [rotor_columns(piece, model, {}) for piece in pieces]
     count, mass, arm = len(model.exponents), model.mass, model.geometry.arm
     # each basis function's coefficient if it alone carried the weight
-    totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(count)]
-    each = {f"a{j}": model.weight / max(x.mean(), 1e-12) for j, x in enumerate(totals)}
-    shares = [a / count for a in each.values()]
+    totals = {e: np.concatenate([c[f"T{e}"] for c in columns]) for e in model.exponents}
+    each = {f"a{e}": model.weight / max(x.mean(), 1e-12) for e, x in totals.items()}
+    shares = {e: each[f"a{e}"] / count for e in totals}
     gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
     # a loop that answers a swinging load opposes its own slow torque, and no quick one
     _, quick = _first_gains(pieces, columns, shares, (ANSWERED_HZ, BAND))
@@ -109,17 +110,17 @@ def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, A
 
 
 def _first_gains(
-    pieces: Pieces, columns: list[NamedArrays], thrust: list[float], band: Pair
+    pieces: Pieces, columns: list[NamedArrays], thrust: Mapping[int, float], band: Pair
 ) -> ArrayPair:
     """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly, and their correlation
-    (3,) in a ``band`` in Hz. About x and y the first is the inertia's inverse, about z the inverse
-    times torque over thrust (m). Each is taken at the delay, up to 80 ms, of the largest
-    correlation of either sign.
+    (3,) in a ``band`` in Hz. ``thrust`` is a coefficient for each exponent. About x and y the first
+    is the inertia's inverse, about z the inverse times torque over thrust (m). Each is taken at the
+    delay, up to 80 ms, of the largest correlation of either sign.
     """
     cross, power, turned = np.zeros((len(_FIRST_DELAYS), 3)), np.zeros(3), np.zeros(3)
     for piece, column in zip(pieces, columns, strict=True):
         torque = np.sum(
-            [[a * column[f"{axis}{j}"] for axis in "XYZ"] for j, a in enumerate(thrust)], axis=0
+            [[a * column[f"{axis}{e}"] for axis in "xyz"] for e, a in thrust.items()], axis=0
         )
         # turning is the integral of torque: compared where neither is differentiated
         spin = np.cumsum(torque.T - torque.mean(axis=1), axis=0) * piece.period
