@@ -6,7 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.effects import Role, get
-from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, Vehicle
+from ...dynamics.vehicle import (
+    QUADRANT,
+    EffectSetting,
+    Mocap,
+    MotorCurve,
+    Uncertainty,
+    Vehicle,
+)
 from ..logs.flight_log import Logs
 from ..logs.table import NamedNumbers, Values, median_step
 from ..motion.sensor_noise import sensor_noise
@@ -14,7 +21,6 @@ from .effect_settings import effect_of
 from .geometry import (
     COMMAND_SPREAD,
     HOVER_SPEED,
-    QUADRANT,
     ROTOR_RADIUS,
     THRUST_SPREAD,
 )

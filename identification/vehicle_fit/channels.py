@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,7 +49,8 @@ class MotionPiece(NamedTuple):
     angular_acceleration: Array  # (n, 3) rad/s2
     angular_velocity: Array  # (n, 3) rad/s, smoothed
     velocity: Array | None = None  # (n, 3) m/s, body axes, smoothed
-    rotor_speeds: Array | None = None  # (n, 4) rad/s
+    # (n, 4) speeds in rad/s, or commands where no speeds are compared
+    rotors: Array = np.empty((0, 4))
     command: Array | None = None  # (n, 4), 0 to 1
     voltage: Array | None = None  # (n,) V
 
@@ -58,25 +59,16 @@ class MotionPiece(NamedTuple):
         at the end.
         """
         rows = np.clip(np.arange(len(self.t)) - late, 0, len(self.t) - 1)
-        of_rotors = {n: getattr(self, n) for n in ("rotor_speeds", "command", "voltage")}
-        return self._replace(**{n: x[rows] for n, x in of_rotors.items() if x is not None})
+        return self.mapped(itemgetter(rows), "rotors", "voltage")
 
     def measured(self) -> Array:
         """Return specific force and angular acceleration (n, 6)."""
         return np.column_stack([self.specific_force, self.angular_acceleration])
 
-    @property
-    def rotors(self) -> Array:
-        """Rotor speeds in rad/s, or commands where no speeds are compared (n, 4)."""
-        rotors = self.command if self.rotor_speeds is None else self.rotor_speeds
-        assert rotors is not None
-        return rotors
-
-    def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
-        """Return the piece with each of its series changed."""
-        every = self._asdict().items()
-        series: Data = {n: change(x) for n, x in every if isinstance(x, np.ndarray)}
-        return self._replace(**series)
+    def mapped(self, change: Callable[[Array], Any], *names: str) -> "MotionPiece":
+        """Return the piece with each of its series changed, or these alone."""
+        some: Data = {name: getattr(self, name) for name in names or self._fields}
+        return self._replace(**{n: change(x) for n, x in some.items() if np.ndim(x)})
 
 
 Pieces = list[MotionPiece]
@@ -144,12 +136,8 @@ def speed_noise(pieces: Pieces) -> float:
     """Return the standard deviation (rad/s) of the white noise of rotor speeds with their rounding,
     from the highest quarter of their spectrum: no rotor follows its command there.
     """
-    powers = []
-    for piece in pieces:
-        if piece.rotor_speeds is not None:
-            _, power = power_spectrum(piece.rotor_speeds, piece.period, 256)
-            powers.append(power[-len(power) // 4 :].mean(axis=0) / (2.0 * piece.period))
-    return math.sqrt(float(np.median(powers))) if powers else 0.0
+    powers = [power_spectrum(p.rotors, p.period, 256)[1] / (2.0 * p.period) for p in pieces]
+    return math.sqrt(np.median([power[-len(power) // 4 :].mean(axis=0) for power in powers]))
 
 
 def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
@@ -188,7 +176,7 @@ def _without_bias(log: FlightLog) -> FlightLog:
     """
     if log.accelerometer is None or not pose_pieces(log):
         return log
-    off = [_sensor(log, log.accelerometer, s.t) - _felt(s) for s in log_signals(log)]
+    off = [_sensor(log, "accelerometer", s.t) - _felt(s) for s in log_signals(log)]
     return replace(log, accelerometer=log.accelerometer - np.vstack(off).mean(axis=0))
 
 
@@ -202,10 +190,10 @@ def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiec
     for s in log_signals(log, wide_hz=np.inf) if pose_pieces(log) else ():
         force, velocity = _felt(s), in_body(s.velocity, s.rotation)
         rate, turning = s.angular_velocity, s.angular_acceleration
-        if sources.force == "accelerometer" and log.accelerometer is not None:
-            force = _sensor(log, log.accelerometer, s.t)
-        if sources.rate == "gyro" and log.gyro is not None:
-            rate = _sensor(log, log.gyro, s.t)
+        if sources.force == "accelerometer":
+            force = _sensor(log, sources.force, s.t)
+        if sources.rate == "gyro":
+            rate = _sensor(log, sources.rate, s.t)
             turning = derivative(rate, s.period)
         yield MotionPiece(number, s.t, s.period, force, turning, rate, velocity)
 
@@ -217,13 +205,13 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     period = median_step(log.t[read])
     for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
-        rate = _sensor(log, log.gyro, t)
-        none, felt = np.full_like(rate, np.nan), log.accelerometer
-        force = none if felt is None else _sensor(log, felt, t)
+        rate = _sensor(log, "gyro", t)
+        force, velocity = np.full((2, *rate.shape), np.nan)
+        if log.accelerometer is not None:
+            force = _sensor(log, "accelerometer", t)
         piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
         moving = []
-        if sources.velocity:
-            velocity = np.full((len(t), 3), np.nan)  # in gaps of the pose
+        if sources.velocity:  # NaN in gaps of the pose
             for s in log_signals(log) if pose_pieces(log) else ():
                 inside = (t >= s.t[0]) & (t <= s.t[-1])
                 velocity[inside] = resampled(t[inside], s.t, in_body(s.velocity, s.rotation))
@@ -234,10 +222,9 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
 def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
     """Return a piece with the rotors beside its motion; fast logs are thinned out."""
     t, period = piece.t, piece.period
+    rotors = getattr(log, "command" if sources.rotors == "commands" else "rotor_speeds")
     piece = piece._replace(
-        rotor_speeds=(
-            resampled(t, log.t, log.rotor_speeds) if sources.rotors == "rotor speeds" else None
-        ),
+        rotors=resampled(t, log.t, rotors),
         command=None if log.command is None else resampled(t, log.t, log.command),
         voltage=voltage_at(log, t),
     )
@@ -251,13 +238,14 @@ def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
 
         piece = piece.mapped(thinned)._replace(t=thin, period=period)
 
-    rate, velocity = low_pass(piece.angular_velocity, _PRODUCT_HZ, period), piece.velocity
-    if velocity is not None:
-        velocity = low_pass(velocity, _PRODUCT_HZ, period)
-    return piece._replace(angular_velocity=rate, velocity=velocity)
+    def smooth(x: Array) -> Array:
+        return low_pass(x, _PRODUCT_HZ, period)
+
+    return piece.mapped(smooth, "angular_velocity", "velocity")
 
 
-def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
+def _sensor(log: FlightLog, channel: str, t: Array) -> Array:
+    values = getattr(log, channel)
     read = np.isfinite(values[:, 0])
     return resampled(t, log.t[read], values[read])
 

@@ -93,10 +93,9 @@ def identify(
         doubts = _doubts(log) if i in kept else [broken]
         notes += [f"warning: {log.name}: {text}" for text in doubts]
     logs = [logs[i] for i in kept]
-    basic = Model(
-        mass, geometry, sources, voltage_ref=_voltage(pieces), speed_noise=speed_noise(pieces)
-    )
-    step = 0.0 if basic.commands else rounding_step(logs)
+    basic, step = Model(mass, geometry, sources, voltage_ref=_voltage(pieces)), 0.0
+    if not basic.commands:
+        basic, step = replace(basic, speed_noise=speed_noise(pieces)), rounding_step(logs)
     report(0.05, "fitting forces and torques")
     fit = _first_fit(pieces, basic)
     report(0.4, "asking whether slow and quick motion agree")

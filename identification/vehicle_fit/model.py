@@ -14,10 +14,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from ...dynamics.vehicle import SPIN
 from ...runtime.arrays import Array
 from ..logs.table import NamedArrays, NamedNumbers, Names, Values
 from .channels import Sources
-from .geometry import GRAVITY, SPIN, Geometry
+from .geometry import GRAVITY, Geometry
 from .spectra import BAND
 
 T = TypeVar("T", float, Array)

@@ -29,9 +29,9 @@ class MotorResponse(NamedTuple):
 
 
 def motor_response(pieces: Pieces) -> MotorResponse | None:
-    """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
+    """Return how speeds follow commands; None if a piece lacks these, or commands do not move."""
     known = [(p.command, p.period) for p in pieces if p.command is not None]
-    if len(known) < len(pieces) or any(p.rotor_speeds is None for p in pieces):
+    if len(known) < len(pieces):
         return None
 
     def columns(lag: float) -> Array:
