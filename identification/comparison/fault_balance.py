@@ -72,7 +72,7 @@ class FaultBalance:
         parts = zip(SIGNS, [*free, []], [*turning, samples.specific_force], strict=True)
         columns = [np.array([thrust @ signs, *own, y]) for signs, own, y in parts]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
-        away += _TURNING * np.square(w).sum(axis=0) + samples.between
+        away += _TURNING * (w**2).sum(axis=0) + samples.between
         # at the start of a fault the error of its shape grows with the acceleration
         strong = maximum_filter1d(np.linalg.norm(turning[:2], axis=0), _AROUND)
         away += strong / max(strong.max(), 1e-300)
@@ -136,7 +136,7 @@ class _BalanceChannel:
         # products of an impulse in each row with all directions: the filter runs backwards. A step
         # is a row of impulses. Behind them the sum of squares of a step since ever
         products = self.filtered(directions.T[:, ::-1]) * self.weight[::-1]
-        squares = np.square(self._innovations(np.ones(len(whole))))[::-1]
+        squares = (self._innovations(np.ones(len(whole))) ** 2)[::-1]
         sums = np.vstack([products, squares]).cumsum(axis=1)[:, ::-1]
         self.from_row_on = np.vstack([sums, self.weight, whole])
 
@@ -171,9 +171,9 @@ class _BalanceChannel:
         *known, own = windows[:-3] @ np.diff(begun, prepend=0.0)
         squares, weight, whole = windows[-3:]
         outputs = whole * self.filtered(begun * weight)
-        square = np.square(outputs[:, :-1]).sum(axis=1) + squares[:, -1]
+        square = (outputs[:, :-1] ** 2).sum(axis=1) + squares[:, -1]
         left = square - np.square(known).sum(axis=0)
-        gain = np.square(own) / np.maximum(left, 1e-12 * square + 1e-300)
+        gain = own**2 / np.maximum(left, 1e-12 * square + 1e-300)
         width = 1.0 + np.log(np.maximum(gain / self.variance, 1.0))
         price = 0.5 * np.maximum(width, math.log(self.whole.sum()))
         return np.asarray(_log_likelihood(self.rest - gain, self.weight[self.whole]) - price)
@@ -190,7 +190,7 @@ def _fit_noise(residual: Array, weight: Array, whole: Mask) -> tuple[Any, float,
     gram = windows.T @ windows
     ridge = _RIDGE * gram[0, 0] * np.eye(ORDER)
     poles = np.linalg.solve(gram[1:, 1:] + ridge, gram[1:, 0])
-    rest = np.square(windows @ (whitener := np.append(1.0, -poles))).sum()
+    rest = ((windows @ (whitener := np.append(1.0, -poles))) ** 2).sum()
     return _log_likelihood(rest, weight[whole]), rest / len(windows), whitener, weight
 
 

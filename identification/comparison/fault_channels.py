@@ -87,7 +87,7 @@ def samples_of(log: FlightLog, path: Path | None = None) -> Samples:
         if log_map.commands:
             motors = tuple(f"PX4 motor {i}" for i in log_map.commands.order)
     else:
-        command = np.square(log.rotor_speeds) if log.command is None else log.command
+        command = log.rotor_speeds**2 if log.command is None else log.command
         # a held command changes at its own samples alone
         new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
         new[-1] = True

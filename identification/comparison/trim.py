@@ -75,7 +75,7 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     """
     name = log.source or log.name
     if log.has_rotor_speeds or log.command is None:
-        thrust = np.square(log.rotor_speeds) * vehicle.k
+        thrust = log.rotor_speeds**2 * vehicle.k
     elif vehicle.motor_curve is None:
         thrust = log.command
     else:

@@ -144,5 +144,5 @@ def air_columns(piece: MotionPiece, model: Model) -> NamedArrays:
         for a, v in zip("xyz", piece.velocity.T, strict=True):
             out[f"F{a} linear drag {a}"], out[f"F{a} quadratic drag {a}"] = -v, -speed * v
         across = _local(piece, piece.velocity, model)[:, :, :2]
-        out |= _at_rotors(0.25 * np.square(across).sum(axis=2), 2, "lift", model)
+        out |= _at_rotors(0.25 * (across**2).sum(axis=2), 2, "lift", model)
     return out

@@ -48,7 +48,7 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
         return best, target - x @ best
 
     likeliest = minimize_scalar(
-        lambda log_lag: np.square(fitted(math.exp(log_lag))[1]).sum(),
+        lambda log_lag: (fitted(math.exp(log_lag))[1] ** 2).sum(),
         bounds=np.log(_LAGS),
         method="bounded",
         options={"xatol": 1e-3},

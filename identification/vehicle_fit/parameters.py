@@ -133,8 +133,8 @@ def _first_gains(
         spin, rate = (sosfiltfilt(sections, x, axis=0) for x in (spin, piece.angular_velocity))
         late = np.rint(_FIRST_DELAYS / piece.period).astype(int)
         cross += [(spin[: len(spin) - n] * rate[n:]).sum(axis=0) for n in late]
-        power += np.square(spin).sum(axis=0)
-        turned += np.square(rate).sum(axis=0)
+        power += (spin**2).sum(axis=0)
+        turned += (rate**2).sum(axis=0)
     most = cross[np.abs(cross).argmax(axis=0), range(3)]
     least = np.finfo(float).tiny
     return most / np.maximum(power, least), most / np.maximum(np.sqrt(power * turned), least)

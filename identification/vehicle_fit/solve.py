@@ -248,8 +248,9 @@ def _newton(made: BalanceSpectra, grams: Array, theta: Array) -> tuple[Array, Ar
     """
     (left, rows), model = slopes(made.combined, theta), made.model
     weighted = np.einsum("iac,acd->iad", rows, grams)
-    units = [model.scale.get(n, 1.0) / model.prior.get(n, math.inf) for n in model.free]
-    strength = np.square(units)
+    strength = np.square(
+        [model.scale.get(n, 1.0) / model.prior.get(n, math.inf) for n in model.free]
+    )
     # the rotors' noise, taken off, can exceed a combination's power: such data tell nothing
     told, axes = np.linalg.eigh(np.einsum("iad,jad->ij", weighted, rows))
     # parameters without excitation stay
