@@ -8,20 +8,13 @@ from typing import Any
 import numpy as np
 
 from ...runtime.drawing import AFTER, BEFORE, BLACK, GREY, new_figure, room_above, styled
-from ...runtime.page_files import write_json, write_png
+from ...runtime.page_files import page_template, write_json, write_png
 from ...runtime.plain_values import plain
 from ..logs.table import Data, Values
 from ..logs.what_flew import PLACES
-from .change import NOWHERE, SOMETHING_ELSE, SURE, Change
-from .fault_detection import ALL, NOTHING, OTHER, ROTORS, RotorFault
+from .change import SURE, Change
+from .fault_detection import ROTORS, RotorFault
 
-# sentences with a place for the probability
-_NO_ROTOR = {
-    NOTHING: "No rotor lost thrust {}.",
-    OTHER: "No rotor fault explains what happened: a force or torque began that no rotor makes, "
-    "a gust, a load or a collision {}.",
-    ALL: "All rotors lost thrust at once {}: the battery, the air, or the vehicle.",
-}
 _NAMED = 0.05  # least probability of a rival in the sentence
 
 
@@ -34,29 +27,8 @@ def _undecided(chances: Values) -> str:
 
 def change_headline(change: Change) -> str:
     """Return a sentence on the change, with its probability."""
-    place, chance = change.place, f"{change.probabilities[change.place]:.2f}"
-    size = f"{100 * change.amount:.0f} ± {100 * change.amount_std:.0f} %"
-    if place == NOWHERE:
-        unchanged = f"Nothing changed (probability {chance})."
-        return unchanged if change.sure else _undecided(change.probabilities)
-    if place == SOMETHING_ELSE:
-        kind = "the rotors share the work otherwise than one weaker rotor or one weight would ask."
-    elif place == "all rotors":
-        kind = (
-            f"all rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
-        )
-    elif change.weaker >= SURE:
-        kind = f"that rotor delivers {size} less for what it is asked."
-    elif change.carries_more >= SURE:
-        kind = f"the vehicle carries {size} of its weight more there."
-    else:
-        kind = (
-            f"the rotor delivers {size} less (probability {change.weaker:.2f}), or the vehicle "
-            f"carries as much more there ({change.carries_more:.2f}): these look alike."
-        )
-    if not change.sure:
-        return f"{_undecided(change.probabilities)} If the first: {kind}"
-    return f"Changed: {place}, probability {chance}; {kind}"
+    text = page_template(__package__, "templates/change.j2", html=False)
+    return text.render(change=change, undecided=_undecided(change.probabilities), sure=SURE)
 
 
 def change_data(change: Change) -> Data:
@@ -119,19 +91,9 @@ def _in_words(fault: RotorFault, cause: str) -> str:
 
 def fault_headline(fault: RotorFault) -> str:
     """Return a sentence on the rotor fault, its time and size, with its probability."""
-    if not fault.sure:
-        return _undecided({_in_words(fault, x): p for x, p in fault.probabilities.items()})
-    chance = fault.probabilities[fault.found]
-    sure = f"(probability {f'{chance:.2f}' if chance < 0.9995 else 'above 0.999'})"
-    if fault.rotor is None:
-        return _NO_ROTOR[fault.found].format(sure)
-    rotor = _in_words(fault, fault.found).removeprefix("a fault of r")
-    low, high = fault.onset_ci95_s
-    lost, most, least = (100 - 100 * x for x in (fault.remaining, *fault.remaining_ci95))
-    return (
-        f"R{rotor} lost {lost:.0f} % of its thrust ({least:.0f} to {most:.0f}) at t = "
-        f"{fault.onset_s:.3f} s ({low:.3f} to {high:.3f}, the log's clock) {sure}."
-    )
+    undecided = _undecided({_in_words(fault, x): p for x, p in fault.probabilities.items()})
+    text = page_template(__package__, "templates/fault.j2", html=False)
+    return text.render(fault=fault, undecided=undecided, cause=_in_words(fault, fault.found))
 
 
 def fault_data(fault: RotorFault) -> Data:

@@ -21,23 +21,16 @@ either axis, ``rotor_dyn_coef`` 1/s, ``drag_matrix`` N/(m/s) along body axes, ne
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from ...dynamics.effects import Role
-from ...runtime.page_files import page_template
 from ..logs.table import Values
 from .effect_settings import coefficient_of, effect_of, linear_drag
-from .result import Identified
+from .result import Identified, text_of
 
 AIR_DENSITY = 1.225  # kg/m3, at sea level, as in both autopilots
 _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
-
-
-def _text(name: str, **given: Any) -> str:
-    """Return the text of a template."""
-    return page_template(__package__, f"templates/{name}.j2", html=False).render(**given)
 
 
 def _autopilot(line: str, most: Values, identified: Identified) -> str:
@@ -61,17 +54,17 @@ def _autopilot(line: str, most: Values, identified: Identified) -> str:
         values[3:] = vehicle.weight / (4.0 * thrust[-1]), share
     known = {p: x for p, x in zip(most, values, strict=True) if np.isfinite(x)}
     full = identified.estimates.get("thrust(1)")
-    return _text("autopilot", line=line, values=known, most=most, full=full).removesuffix("\n")
+    return text_of("autopilot", line=line, values=known, most=most, full=full).removesuffix("\n")
 
 
 def _simulator(name: str, identified: Identified) -> str:
     """Return a simulator's parameters."""
     v, known = identified.vehicle, identified.estimates
     lag, drag = known[effect_of(Role.LAG)].value, linear_drag(v)
-    return _text(
+    return text_of(
         name,
         v=v,
-        notes=_text("notes", v=v, estimates=known, commands=identified.fit.model.commands),
+        notes=text_of("notes", v=v, estimates=known, commands=identified.fit.model.commands),
         positions=(v.positions - v.com).tolist(),
         lag=lag if lag > 0.0 else None,
         drag=-np.diag(drag) if any(drag) else None,

@@ -246,8 +246,3 @@ def powers(fit: VehicleFit, spectra: Spectra | None = None) -> Array:
         both = np.abs([residual, measured])
         out.append((both**2 / unit).sum(axis=(1, 2)))
     return np.array(out)
-
-
-def refuted(vehicle: Vehicle) -> list[str]:
-    """Return the parts of a vehicle's model that data outside its fit refuted."""
-    return [part for part in ("force", "torque") if getattr(vehicle.status, part) == "refuted"]

@@ -18,9 +18,9 @@ from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
-from .held_out import LEAST_HZ, powers, refuted
+from .held_out import LEAST_HZ, powers
 from .model import coefficients
-from .result import ASSUMED, IDENTIFIED, NOTHING, Identified
+from .result import ASSUMED, NOTHING, Identified, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,39 +68,14 @@ def headline(identified: Identified) -> str:
     """Return one sentence: parts refuted by held-out flight, identified quantities with half of
     their 95 % interval, and assumed ones.
     """
-    parts = " and the ".join(refuted(identified.vehicle))
-    begin = f"held-out flight refutes the {parts}; " if parts else ""
     thrust = "thrust(0.5)" if identified.fit.model.commands else "k"
     shown = [identified.estimates[name] for name in (thrust, "Jxx", "Jyy", "Jzz", "p/k")]
-    assumed = ", ".join(e.name for e in shown if e.status in (ASSUMED, NOTHING))
-    told = ", ".join(
-        f"{e.name} {e.value:.3g} ± {0.5 * (e.high - e.low):.2g} {e.unit}"
-        for e in shown
-        if e.status == IDENTIFIED
-    )
-    rest = f"; assumed, since these logs do not tell: {assumed}" if assumed else ""
-    return f"{begin}identified: {told or 'nothing'}{rest}"
+    return text_of("headline", v=identified.vehicle, shown=shown)
 
 
 def use_of(identified: Identified) -> str:
     """Return one sentence: the use of the vehicle's file for predictions."""
-    parts = refuted(identified.vehicle)
-    if identified.vehicle.status.force == ASSUMED:
-        return "Use: nothing could be held out, so that no number is confirmed. Fly longer."
-    if identified.vehicle.closed_loop is not None:
-        kept = "an unchanged velocity" if "force" in parts else "the vehicle for force"
-        return (
-            f"Use: {kept}, and the flight loop's reaction for the body rate (predict does both). "
-            "Plant and tasks fly assumed inertia and reaction torque."
-        )
-    return {
-        "": "Use: this vehicle.",
-        "force": "Use: the vehicle for torque, with an unchanged velocity (predict does both).",
-        "torque": "Use: the vehicle for force, with an unchanged body rate (predict does both). "
-        "Inertia and reaction torque are assumed.",
-        "force torque": "Use: assume an unchanged velocity and body rate; the vehicle predicts no "
-        "better. Fly as advised and identify again.",
-    }[" ".join(parts)]
+    return text_of("use", v=identified.vehicle)
 
 
 def reasons_of(found: Identified) -> list[str]:
