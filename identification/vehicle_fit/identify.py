@@ -33,7 +33,17 @@ from .model import Model
 from .motors import motor_response
 from .parameters import FORCE_BIAS, FURTHER, POSED_BIAS, QUANTITIES, first_model
 from .plausible import check_thrust
-from .result import ASSUMED, IDENTIFIED, NOTHING, REFUTED, Estimate, Estimated, Identified, told
+from .result import (
+    ASSUMED,
+    IDENTIFIED,
+    NOTHING,
+    REFUTED,
+    Estimate,
+    Estimated,
+    Identified,
+    text_of,
+    told,
+)
 from .solve import VehicleFit, nearest_body, score_tests, solve
 from .spectra import BAND
 
@@ -99,38 +109,15 @@ def identify(
     report(0.05, "fitting forces and torques")
     fit = _first_fit(pieces, basic)
     report(0.4, "asking whether slow and quick motion agree")
-    fit, doubt = _agreeing(fit), ""
-    if fit.model.band < BAND:
-        doubt = "quick motion contradicts slow motion in these logs"
-        notes.append(
-            f"warning: above {fit.model.band:g} Hz these logs contradict what they say below, as "
-            "logs do that were smoothed before they were written, or whose rotor speeds are noisy: "
-            "only what is slower was used"
-        )
+    fit = _agreeing(fit)
     if sources.force == "accelerometer" and sources.velocity:
         biases = dict.fromkeys(QUANTITIES["biases"], POSED_BIAS)
         fit = fit.again(prior={**fit.model.prior, **biases})
     report(0.5, "asking what else shows")
     fit = _with_optional(fit)
-    if "answered torque" in fit.kept:
-        shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
-        notes.append(
-            f"below {ANSWERED_HZ:g} Hz {shares} of the rotors' torque about x, y and z turn "
-            "nothing: the flight loop answers moments that nothing measures. Inertia is told by "
-            "what is quicker"
-        )
     report(0.8, "asking what can be told")
-    if fit.model.opposite:
-        notes.append(
-            "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
-            "above): the opposite ones were taken"
-        )
-    if sources.force == "accelerometer" and not sources.velocity:
-        notes.append(
-            "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
-            "thrust"
-        )
     motors = None if basic.commands or "lag" in fit.model.free else motor_response(pieces)
+    doubt = "quick motion contradicts slow motion in these logs" * (fit.model.band < BAND)
 
     def described(part: VehicleFit, why: str) -> tuple[Estimated, Vehicle]:
         part, _ = nearest_body(replace(part, doubt=doubt or why))
@@ -142,11 +129,8 @@ def identify(
     named, vehicle = described(fit, tested.why)
     check_thrust(vehicle, not basic.commands, logs[0].name)
     _, excess = nearest_body(fit)
-    if excess > _APART:
-        notes.append(
-            f"warning: turning shows a principal inertia {excess:.1f} standard deviations above "
-            "the sum of the other two, the most that a body has: something else turns the vehicle"
-        )
+    limits = {"band": BAND, "answered_hz": ANSWERED_HZ, "apart": _APART}
+    notes += text_of("doubts", fit=fit, excess=excess, **limits).splitlines()
     vehicle = _with_status(vehicle, named, tested)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(fit)
