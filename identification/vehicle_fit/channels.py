@@ -206,16 +206,13 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, "gyro", t)
-        force, velocity = np.full((2, *rate.shape), np.nan)
+        force = np.full_like(rate, np.nan)
         if log.accelerometer is not None:
             force = _sensor(log, "accelerometer", t)
-        piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
-        moving = []
-        if sources.velocity:  # NaN in gaps of the pose
-            for s in log_signals(log) if pose_pieces(log) else ():
-                inside = (t >= s.t[0]) & (t <= s.t[-1])
-                velocity[inside] = resampled(t[inside], s.t, in_body(s.velocity, s.rotation))
-            moving = _cut(piece._replace(velocity=velocity), np.isfinite(velocity[:, 0]))
+        piece, moving = MotionPiece(number, t, period, force, derivative(rate, period), rate), []
+        for s in log_signals(log) if sources.velocity and pose_pieces(log) else ():
+            velocity = resampled(t, s.t, in_body(s.velocity, s.rotation))
+            moving += _cut(piece._replace(velocity=velocity), (t >= s.t[0]) & (t <= s.t[-1]))
         yield from moving or [piece]
 
 

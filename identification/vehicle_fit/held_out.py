@@ -12,7 +12,7 @@ hold the trajectory, too: on a slower flight of a racer the body rate was off by
 of no change, and by 0.9 times with two dampings.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -64,46 +64,22 @@ class HeldOut(NamedTuple):
     why: str = ""
 
 
-class _HeldParts(NamedTuple):
-    """Starts in the segments of a fit, and the parts held out in turn."""
-
-    starts: list[LoggedStarts]  # of each log
-    refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
-
-    def errors(self, models: Callable[[VehicleFit, Mask], Models]) -> Errors:
-        """Return the errors of models made of each refit and the segments that it keeps."""
-        errors: Errors = {}
-        for where, kept, part in self.refits:
-            starts = [of.those(~kept[of.segment]) for of in self.starts]
-            if any(len(of.rows) for of in starts):
-                vehicles = models(part, kept)
-                said = errors.setdefault(where, {name: [] for name in vehicles})
-                offs = errors_at(starts, list(vehicles.values()))
-                for name, off in zip(vehicles, offs, strict=True):
-                    said[name].append(off)
-        return errors
-
-
-def _held_parts(logs: Logs, fit: VehicleFit, vehicle: Vehicle) -> _HeldParts:
-    """Return the starts in the segments of a fit.
-
-    Raises:
-        InputError: too little would be left of the logs.
-    """
-    number = np.array([s.log for s in fit.balance.segments])
-    spans, starts = [s.span for s in fit.balance.segments], []
-    for i, log in enumerate(logs):
-        own = np.flatnonzero(number == i)
-        part = logged_starts(log, vehicle, [spans[k] for k in own], _HORIZON)
-        starts.append(part._replace(segment=own[part.segment]))
-    folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
-    refits = [
-        (where, *each)
-        for where, fold in folds.items()
-        if np.ptp(fold) > 0
-        for each in refitted(fit, fold)
-    ]
-    return _HeldParts(starts, refits)
+def _errors(
+    all_starts: Sequence[LoggedStarts],
+    refits: Sequence[tuple[str, Mask, VehicleFit]],
+    models: Callable[[VehicleFit, Mask], Models],
+) -> Errors:
+    """Return the errors of models made of each refit and the segments that it keeps."""
+    errors: Errors = {}
+    for where, kept, part in refits:
+        starts = [of.those(~kept[of.segment]) for of in all_starts]
+        if any(len(of.rows) for of in starts):
+            vehicles = models(part, kept)
+            said = errors.setdefault(where, {name: [] for name in vehicles})
+            offs = errors_at(starts, list(vehicles.values()))
+            for name, off in zip(vehicles, offs, strict=True):
+                said[name].append(off)
+    return errors
 
 
 def held_out(
@@ -124,30 +100,41 @@ def held_out(
     """
     if not all(log.has_pose for log in logs):
         return _by_balance(fit)
-    whole = vehicle_of(fit, "")
-    parts = _held_parts(logs, fit, whole)
-    errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
+    whole, starts, segments = vehicle_of(fit, ""), [], fit.balance.segments
+    number = np.array([s.log for s in segments])
+    for i, log in enumerate(logs):
+        own = np.flatnonzero(number == i)
+        of_log = logged_starts(log, whole, [segments[k].span for k in own], _HORIZON)
+        starts.append(of_log._replace(segment=own[of_log.segment]))
+    folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
+    refits = [
+        (where, *each)
+        for where, fold in folds.items()
+        if np.ptp(fold) > 0
+        for each in refitted(fit, fold)
+    ]
+    errors = _errors(starts, refits, lambda part, _: models_of(vehicle_of(part, "")))
     loop: LoopFit | None = None
     if not errors:
         # torques refuted on the flight of their fit were off by up to 37 times the error of no
         # change on others (10 Crazyflie flights of 9 s)
-        if any(len(of.rows) for of in parts.starts):
-            loop = fit_loop(parts.starts, whole, damped=True)
+        if any(len(of.rows) for of in starts):
+            loop = fit_loop(starts, whole, damped=True)
             damped = replace(whole, closed_loop=loop.loop)
-            near, far = (of.model[:, -1] for of in errors_at(parts.starts, [damped, whole]))
+            near, far = (of.model[:, -1] for of in errors_at(starts, [damped, whole]))
             loop = loop if np.log(near / far).mean() < 0.0 else None
         return HeldOut({}, "", loop)
     stands, why = standing(errors), ""
     if stands not in ("torque", WHOLE):
         why, alone = _reason(errors), OTHER_FLIGHTS not in errors
-        fitted = loop = fit_loop(parts.starts, vehicle_of(fit, why), damped=alone)
+        fitted = loop = fit_loop(starts, vehicle_of(fit, why), damped=alone)
 
         def without(part: VehicleFit, kept: Mask) -> Models:
             vehicle = vehicle_of(part, why)
-            starts = [of.those(kept[of.segment]) for of in parts.starts]
-            return loops_of(vehicle, fit_loop(starts, vehicle, fitted.loop, alone).loop)
+            others = [of.those(kept[of.segment]) for of in starts]
+            return loops_of(vehicle, fit_loop(others, vehicle, fitted.loop, alone).loop)
 
-        further = parts.errors(without)
+        further = _errors(starts, refits, without)
         errors = {where: {**each, **further[where]} for where, each in errors.items()}
         stands = standing(errors)
     pooled = {
