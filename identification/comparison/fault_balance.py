@@ -69,27 +69,28 @@ class FaultBalance:
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
         free[2].extend(turning[:2])
         # each channel's moment, free columns and measurement
-        parts = zip(SIGNS, [*free, []], [*turning, samples.specific_force], strict=True)
-        columns = [np.array([thrust @ signs, *own, y]) for signs, own, y in parts]
+        rows = zip(SIGNS, [*free, []], [*turning, samples.specific_force], strict=True)
+        columns = [np.array([thrust @ signs, *own, y]) for signs, own, y in rows]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
         away += _TURNING * (w**2).sum(axis=0) + samples.between
         # at the start of a fault the error of its shape grows with the acceleration
         strong = maximum_filter1d(np.linalg.norm(turning[:2], axis=0), _AROUND)
         away += strong / max(strong.max(), 1e-300)
         activity = maximum_filter1d(away, 2)  # a rotor late by an interval is wrong there too
-        step: list[Array] = []  # none, and then the likeliest jump beside the noise
         nothing: list[float] = []
+        self.share = np.zeros(count)  # of no jump, and then of the likeliest beside the noise
         for _ in range(3):
-            self.channels = [_BalanceChannel(x, activity, samples.whole, *step) for x in columns]
+            self.channels = [
+                _BalanceChannel(x, activity, samples.whole, self.share) for x in columns
+            ]
             nothing.append(sum(channel.nothing for channel in self.channels))
             k = BEFORE + int(np.argmax(self.steps(self.rows, self.ramps[:1])))
             begin = max(k - 2, BEFORE)
             logs = self.steps(slice(begin, min(k + 3, self.rows.stop)), self.ramps)
             self.log = logs.max()
             ramp, more = np.unravel_index(np.argmax(logs), logs.shape)
-            share = np.concatenate([np.zeros(begin + more), self.ramps[ramp], np.ones(count)])
-            self.share = share[:count]
-            step = [self.share]
+            parts = np.zeros(begin + more), self.ramps[ramp], np.ones(count)
+            self.share = np.concatenate(parts)[:count]
         self.nothing = max(nothing[0], nothing[-1])
 
     def steps(self, rows: slice, ramps: Array) -> Array:
@@ -113,13 +114,13 @@ class _BalanceChannel:
         columns: (c, N) these, in this order.
         activity: (N,) relative deviation of the rotors from the mean.
         whole: (N,) the ``ORDER`` samples before are there, without a gap.
-        step: further columns (N,) in the fit of the noise.
+        step: (N,) a further column in the fit of the noise.
     """
 
-    def __init__(self, columns: Array, activity: Array, whole: Mask, *step: Array) -> None:
+    def __init__(self, columns: Array, activity: Array, whole: Mask, step: Array) -> None:
         from scipy.signal import lfilter  # as late as can be: it takes .6 s
 
-        y, x = columns[-1], np.vstack([columns[:-1], *step])
+        y, x = columns[-1], np.vstack([columns[:-1], step])
         moment = np.linalg.lstsq(x.T, y, rcond=None)[0][0]
         x = x[int(moment <= 0.0) :]  # a moment with a negative factor is left out
         residual = y - np.linalg.lstsq(x.T, y, rcond=None)[0] @ x

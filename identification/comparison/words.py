@@ -33,8 +33,7 @@ def change_headline(change: Change) -> str:
 
 def change_data(change: Change) -> Data:
     """Return the finding as plain data."""
-    data: Data = plain({"headline": change_headline(change), **change._asdict()})
-    return data
+    return dict(plain({"headline": change_headline(change), **change._asdict()}))
 
 
 def write_change(change: Change, folder: Path) -> tuple[Path, Path]:
@@ -98,9 +97,9 @@ def fault_headline(fault: RotorFault) -> str:
 
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
-    data: Data = plain({"headline": fault_headline(fault), **fault._asdict(), "samples": None})
+    data = {"headline": fault_headline(fault), **fault._asdict()}
     del data["samples"]
-    return data
+    return dict(plain(data))
 
 
 def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:

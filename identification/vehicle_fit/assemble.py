@@ -17,7 +17,7 @@ from ...dynamics.vehicle import (
 from ..logs.flight_log import Logs
 from ..logs.table import NamedNumbers, Values, median_step
 from ..motion.sensor_noise import sensor_noise
-from .effect_settings import effect_of
+from .effect_settings import LAG, effect_of
 from .geometry import (
     COMMAND_SPREAD,
     HOVER_SPEED,
@@ -61,13 +61,13 @@ def vehicle_of(
         k = estimates["k"].value
         if motors is not None:  # thrust against command by way of the speed
             curve = MotorCurve(tuple(k * np.polynomial.polynomial.polypow(motors.speed, 2)))
-    late, of_lag = "lag" in model.free, effect_of(Role.LAG)
+    late = "lag" in model.free
     coefficients = {role: _coefficients(role, shown) for role in ROLES}
     if coefficients[Role.ROTOR_DRAG]:  # a drag at the rotors damps by itself
         coefficients[Role.RATE_DAMPING] = {}
     if late:
-        lag = get(of_lag).coefficients[0].name
-        coefficients[Role.LAG] = {lag: estimates[of_lag].value}
+        lag = get(LAG).coefficients[0].name
+        coefficients[Role.LAG] = {lag: estimates[LAG].value}
     effects = [EffectSetting(effect_of(r), c) for r, c in coefficients.items() if c]
     if (behind := shown.get("time_offset", 0.0)) > 0.0:
         effects.append(EffectSetting("latency", {"d": behind}))
@@ -131,7 +131,7 @@ def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertaint
 
 def advice_of(estimates: Estimated) -> list[str]:
     """Return the flights or arguments to add for quantities missing from the logs."""
-    known = estimates | {"lag": estimates[effect_of(Role.LAG)]}
+    known = estimates | {"lag": estimates[LAG]}
     if estimates["arm_l"].status == ASSUMED:  # and inertia with it
         known = {name: e for name, e in known.items() if name not in ("Jxx", "Jyy", "Jzz")}
     texts = [

@@ -19,7 +19,7 @@ from ...runtime.arrays import Array
 from ..logs.table import NamedArrays, NamedNumbers, Names, Values
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece, Pieces
-from .model import PAIRS, Model, coefficients
+from .model import NONLINEAR, PAIRS, Model, coefficients
 from .spectra import BAND, Segment, segments_of
 
 # s at either end of a piece, outside all segments: the rotors' columns are set back by less, and
@@ -60,7 +60,7 @@ class BalanceSpectra(NamedTuple):
 def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about the nonlinear parameters of ``theta``."""
     values = model.values(theta)
-    centre = {name: values[name] for name in model.nonlinear}
+    centre = {name: values[name] for name in NONLINEAR if name in values}
     segments: list[Segment] = []
     for whole in pieces:
         late, ends = round(model.late / whole.period), round(MARGIN / whole.period)

@@ -9,6 +9,9 @@ def effect_of(role: str) -> str:
     return playing(Role(role))[0]
 
 
+LAG = effect_of(Role.LAG)
+
+
 def estimate_name(role: str, index: int) -> str:
     """Return the name of a role's estimate: effect and coefficient."""
     effect = effect_of(role)

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from ...dynamics.effects import Role
 from ...runtime.errors import InputError
 from ..logs.table import Values
-from .effect_settings import effect_of, estimate_name
+from .effect_settings import LAG, estimate_name
 from .geometry import FLAT, GYRATION, VOLTAGE_EXPONENTS, YAW_REACH, Interval
 from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Estimated, told
@@ -195,22 +195,19 @@ def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
 
 def _lag(fit: VehicleFit) -> Estimates:
     """Yield the rotors' lag, and the time offset of the motion."""
-    name, how = effect_of(Role.LAG), f"force and turning against {fit.model.sources.rotors}"
+    known, status = UNKNOWN, NOTHING
+    how = (
+        "force follows the logged rotor speeds at once: they are measured, and no command is "
+        "logged beside them"
+    )
     if "lag" in fit.model.free:
-        if not fit.model.commands:
-            how += ", which therefore are commanded, not measured"
-        known = fit.interval("lag")
+        known, how = fit.interval("lag"), f"force and turning against {fit.model.sources.rotors}"
+        how += ", which therefore are commanded, not measured" * (not fit.model.commands)
         alike = "a time offset of the motion does nearly the same here"
         doubt = fit.doubt or alike * (not told(known))
         # without the fit's value the thrust would come early
-        status = ASSUMED if doubt else IDENTIFIED
-        yield _estimate(name, known, "s", doubt or how, status=status)
-    else:
-        doubt = (
-            "force follows the logged rotor speeds at once: they are measured, and no command is "
-            "logged beside them"
-        )
-        yield _estimate(name, UNKNOWN, "s", how, doubt)
+        status, how = (ASSUMED, doubt) if doubt else (IDENTIFIED, how)
+    yield Estimate(LAG, *known, "s", status, how)
     offset = fit.interval("delay", False)
     yield _estimate("time_offset", offset, "s", "of the motion behind the rotors")
 
@@ -242,21 +239,15 @@ def _air(fit: VehicleFit, arm: Interval) -> Estimates:
         why = "no velocity is known: the logs have no position"
         yield _estimate("drag", UNKNOWN, "N/(m/s)", "", why)
         return
-    hows = {
-        "force": f"{of.force} along body x and y against velocity",
-        "thrust": "force along body z",
-        "turning": f"{of.rate}, its own derivative against it and against velocity",
-    }
     for kind, effect in FURTHER.items():
         if not effect.role or kind not in fit.kept:
             continue
-        turns = effect.shows == "turning"
-        size = effect.factor * (arm[0] if turns else 1.0)
-        why = (fit.doubt if turns else "") or fit.kept[kind]
+        size = effect.factor * (arm[0] if effect.turns else 1.0)
+        why, how = fit.doubt * effect.turns or fit.kept[kind], effect.how.format(**vars(of))
         for index, parameter in enumerate(effect.parameters, effect.first):
-            known = _times(fit.interval(parameter, turns), size)
-            estimate = _of_effect(effect.role, index, known, hows[effect.shows], why)
-            yield estimate._replace(of_force=not turns)
+            known = _times(fit.interval(parameter, effect.turns), size)
+            estimate = _of_effect(effect.role, index, known, how, why)
+            yield estimate._replace(of_force=not effect.turns)
     if fit.hidden:
         value, deviation, least = (arm[0] * x for x in fit.hidden)
         wide = fit.width * deviation

@@ -26,7 +26,7 @@ import numpy as np
 
 from ...dynamics.effects import Role
 from ..logs.table import Values
-from .effect_settings import coefficient_of, effect_of, linear_drag
+from .effect_settings import LAG, coefficient_of, linear_drag
 from .result import Identified, text_of
 
 AIR_DENSITY = 1.225  # kg/m3, at sea level, as in both autopilots
@@ -60,7 +60,7 @@ def _autopilot(line: str, most: Values, identified: Identified) -> str:
 def _simulator(name: str, identified: Identified) -> str:
     """Return a simulator's parameters."""
     v, known = identified.vehicle, identified.estimates
-    lag, drag = known[effect_of(Role.LAG)].value, linear_drag(v)
+    lag, drag = known[LAG].value, linear_drag(v)
     return text_of(
         name,
         v=v,

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...dynamics.effects import Role, get
-from ...dynamics.vehicle import LoopReaction, ModelStatus, Standing, Vehicle
+from ...dynamics.vehicle import ModelStatus, Standing, Vehicle
 from ...runtime.arrays import Array, Mask
 from ..logs.flight_log import Logs
 from ..prediction import (
@@ -132,7 +132,8 @@ def held_out(
         def without(part: VehicleFit, kept: Mask) -> Models:
             vehicle = vehicle_of(part, why)
             others = [of.those(kept[of.segment]) for of in starts]
-            return loops_of(vehicle, fit_loop(others, vehicle, fitted.loop, alone).loop)
+            found = fit_loop(others, vehicle, fitted.loop, alone)
+            return loops_of(replace(vehicle, closed_loop=found.loop))
 
         further = _errors(starts, refits, without)
         errors = {where: {**each, **further[where]} for where, each in errors.items()}
@@ -160,11 +161,11 @@ def models_of(vehicle: Vehicle) -> Models:
     }
 
 
-def loops_of(vehicle: Vehicle, loop: LoopReaction) -> Models:
-    """Return the models with a loop's reaction in place of the torque, and the reaction alone."""
+def loops_of(vehicle: Vehicle) -> Models:
+    """Return the models with the loop's reaction in place of the torque, and the reaction alone."""
     models = models_of(vehicle)
     return {
-        f"{name}, closed loop": replace(models[name], closed_loop=loop)
+        f"{name}, closed loop": replace(models[name], closed_loop=vehicle.closed_loop)
         for name in (NO_CHANGE, SIMPLEST, "force")
     }
 

@@ -8,7 +8,7 @@ are fixed by a named assumption, or left out.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
-from ..logs.flight_log import FlightLog, Logs
+from ..logs.flight_log import Logs
 from ..logs.magnitudes import motor_doubts
 from ..logs.screening import convention_doubt
 from ..logs.table import Pair
@@ -25,7 +25,7 @@ from .assemble import advice_of, vehicle_of
 from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .closed_loop import UNITS
 from .columns import ANSWERED_HZ
-from .effect_settings import effect_of
+from .effect_settings import LAG
 from .estimates import estimates_of, thrust_of
 from .geometry import Geometry
 from .held_out import HeldOut, held_out, loops_of, models_of
@@ -97,11 +97,13 @@ def identify(
     pieces, sources = checked_pieces(logs, windows)
     kept = sorted({piece.log for piece in pieces})
     pieces = [piece._replace(log=kept.index(piece.log)) for piece in pieces]
-    broken = "left out: no piece of 3 s in flight is unbroken in pose and sensors"
     notes = []
     for i, log in enumerate(logs):
-        doubts = _doubts(log) if i in kept else [broken]
-        notes += [f"warning: {log.name}: {text}" for text in doubts]
+        doubts = ["left out: no piece of 3 s in flight is unbroken in pose and sensors"]
+        if i in kept:
+            load = "a load is tracked: --mass is that of the vehicle with its load"
+            doubts = [convention_doubt(log, None), load * ("payload_position" in log.extra)]
+        notes += [f"warning: {log.name}: {text}" for text in doubts if text]
     logs = [logs[i] for i in kept]
     basic, step = Model(mass, geometry, sources, voltage_ref=_voltage(pieces)), 0.0
     if not basic.commands:
@@ -135,11 +137,10 @@ def identify(
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(fit)
     if motors is not None:
-        lag = effect_of(Role.LAG)
         how = (
             f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
         )
-        named[lag] = Estimate(lag, *motors.known, "s", IDENTIFIED, how)
+        named[LAG] = Estimate(LAG, *motors.known, "s", IDENTIFIED, how)
     return Identified(
         vehicle,
         named,
@@ -156,9 +157,9 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
     """
     models = models_of(vehicle)
     if tested.loop is not None:
-        models |= loops_of(vehicle, tested.loop.loop)
-        models[""] = replace(vehicle, closed_loop=tested.loop.loop)
-        stands = REFUTED if tested.stands in models_of(vehicle) else IDENTIFIED
+        vehicle = replace(vehicle, closed_loop=tested.loop.loop)
+        stands = REFUTED if tested.stands in models else IDENTIFIED
+        models |= loops_of(vehicle)
         for size, (c, unit), value in zip(
             tested.loop.deviations, UNITS.items(), astuple(tested.loop.loop), strict=True
         ):
@@ -203,14 +204,6 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
         for wrong in motor_doubts(log):
             raise InputError(f"{log.name}: {wrong}")
     return pieces, sources
-
-
-def _doubts(log: FlightLog) -> Iterator[str]:
-    """Yield reasons to doubt the axes and the mass of a log."""
-    if text := convention_doubt(log, None):
-        yield text
-    if "payload_position" in log.extra:
-        yield "a load is tracked: --mass is that of the vehicle with its load"
 
 
 def _voltage(pieces: Pieces) -> float:

@@ -22,7 +22,8 @@ from .geometry import GRAVITY, Geometry
 from .spectra import BAND
 
 T = TypeVar("T", float, Array)
-NONLINEAR = ("lag", "gamma", "delay")  # s, 1, s; in the order of their columns
+# parameters inside the columns themselves: s, 1, s; in the order of their columns
+NONLINEAR = ("lag", "gamma", "delay")
 # inertia in logarithms: positive, and with intervals of ratios
 LOGARITHMIC = ("Jx", "Jy", "Jz")
 ROWS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")  # force, and torque about the centre of mass
@@ -74,11 +75,6 @@ class Model:
         """Each rotor's share (4,) in thrust T and in the torques x, y and z, m."""
         x, y = self.geometry.positions[:, :2].T
         return {"T": np.ones(4), "x": y, "y": -x, "z": -self.spin}
-
-    @property
-    def nonlinear(self) -> Names:
-        """Names of the parameters inside the columns themselves."""
-        return tuple(name for name in NONLINEAR if name in self.free)
 
     def values(self, theta: Array) -> NamedNumbers:
         """Return the free parameters in SI units."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ...runtime.arrays import Array
 from ..logs.table import ArrayPair
@@ -64,6 +64,6 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     scores = np.bincount(block, residual * (moves @ inverse[-1]))
     least = max(len(scores) - 1, 1)
     size = math.sqrt(scores @ scores * len(scores) / least)
-    width = student.ppf(0.975, max(least, 3)) * size
+    width = stdtrit(max(least, 3), 0.975) * size
     interval = (lag, max(lag - width, 0.0), lag + width)
     return MotorResponse(best, interval, residual.std() / target.std())

@@ -51,7 +51,8 @@ class Further(NamedTuple):
     role: str = ""
     first: int = 0
     factor: float = 1.0
-    shows: str = ""
+    how: str = ""
+    turns: bool = False
     of_speeds: bool = False
     positive: bool = True
 
@@ -124,12 +125,8 @@ def _first_gains(
         )
         # turning is the integral of torque: compared where neither is differentiated
         spin = np.cumsum(torque.T - torque.mean(axis=1), axis=0) * piece.period
-        sections = butter(
-            2,
-            [min(2.0 * band[0] * piece.period, 0.8), min(0.9, 2.0 * band[1] * piece.period)],
-            btype="bandpass",
-            output="sos",
-        )
+        ends = np.minimum(2.0 * piece.period * np.array(band), (0.8, 0.9))
+        sections = butter(2, ends, btype="bandpass", output="sos")
         spin, rate = (sosfiltfilt(sections, x, axis=0) for x in (spin, piece.angular_velocity))
         late = np.rint(_FIRST_DELAYS / piece.period).astype(int)
         cross += [(spin[: len(spin) - n] * rate[n:]).sum(axis=0) for n in late]

@@ -13,7 +13,7 @@ from ...runtime.arrays import Array
 from ...runtime.drawing import ESTIMATE, TRUTH, new_figure, styled
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
-from ..logs.table import ArrayPair, Data, Names
+from ..logs.table import Data, Names
 from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
@@ -60,8 +60,7 @@ def identified_data(identified: Identified) -> Data:
         ends = errors.model, errors.still, simplest.model
         for name, *of in zip(QUANTITIES, QUANTITIES.values(), *ends, strict=True):
             data[where][name.replace(" ", "_")] = dict(zip(keys, of, strict=True))
-    told: Data = plain(data)
-    return told
+    return dict(plain(data))
 
 
 def headline(identified: Identified) -> str:
@@ -124,7 +123,7 @@ def write_identified(identified: Identified, path: Path) -> list[Path]:
     return written
 
 
-def _fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
+def _fitted(identified: Identified, piece: MotionPiece) -> list[Array]:
     """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
 
     Both are (n, 6), behind the picture's low-pass and within the band of the fit.
@@ -139,8 +138,7 @@ def _fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
     gains = coefficients(fit.model, fit.values, tuple(columns))
     model = np.column_stack(list(columns.values())) @ gains.T
     shown_hz = min(_SHOWN_HZ, fit.model.band)
-    measured = piece.measured()
-    return low_pass(measured, shown_hz, piece.period), low_pass(model, shown_hz, piece.period)
+    return [low_pass(x, shown_hz, piece.period) for x in (piece.measured(), model)]
 
 
 def explained(identified: Identified) -> Array:

@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ...runtime.arrays import Array, Complex, Floats, Index, Mask
 from ...runtime.errors import InputError
@@ -82,7 +82,7 @@ class VehicleFit:
     @cached_property
     def width(self) -> float:
         """Standard deviations to either end of a 95 % interval: Student's, for the segments."""
-        return float(student.ppf(0.975, max(len(self.balance.segments) - 1, 3)))
+        return float(stdtrit(max(len(self.balance.segments) - 1, 3), 0.975))
 
     def again(self, theta: Array | None = None, **changes: Any) -> "VehicleFit":
         """Return the fit of a changed model, from these parameters or others."""
