@@ -26,10 +26,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ...runtime.arrays import Array, Mask
 from ..logs.table import Pair
+from ..motion.smoothing import TOGETHER
 from .fault_channels import ORDER, STEP, Samples
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
-SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
+SIGNS = TOGETHER[[1, 2, 3, 0]] * [[2.0], [-2.0], [2.0], [2.0]]
 BEFORE, AFTER = 25, 4  # least intervals of usual flight before a fault, and after one
 # starts of a loss within an interval: at once (a broken propeller), or as the rotors' speed falls
 # (a motor)

@@ -1,4 +1,4 @@
-"""The vehicle made of estimates, and the flights to add for missing ones."""
+"""The vehicle made of estimates."""
 
 import math
 from dataclasses import replace
@@ -15,7 +15,7 @@ from ...dynamics.vehicle import (
     Vehicle,
 )
 from ..logs.flight_log import Logs
-from ..logs.table import NamedNumbers, Values, median_step
+from ..logs.table import NamedNumbers, median_step
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import LAG, effect_of
 from .geometry import (
@@ -26,12 +26,9 @@ from .geometry import (
 )
 from .model import inertia_of
 from .motors import MotorResponse
-from .parameters import FURTHER, QUANTITIES
-from .result import ASSUMED, IDENTIFIED, NOTHING, Estimated
+from .parameters import FURTHER
+from .result import IDENTIFIED, NOTHING, Estimated
 from .solve import VehicleFit
-
-# roles of the library's effects within a fit's reach
-ROLES = dict.fromkeys(further.role for further in FURTHER.values() if further.role)
 
 
 def vehicle_of(
@@ -62,15 +59,17 @@ def vehicle_of(
         if motors is not None:  # thrust against command by way of the speed
             curve = MotorCurve(tuple(k * np.polynomial.polynomial.polypow(motors.speed, 2)))
     late = "lag" in model.free
-    coefficients = {role: _coefficients(role, shown) for role in ROLES}
-    if coefficients[Role.ROTOR_DRAG]:  # a drag at the rotors damps by itself
-        coefficients[Role.RATE_DAMPING] = {}
+    effects: dict[str, NamedNumbers] = {}
+    for effect in [effect_of(further.role) for further in FURTHER.values() if further.role]:
+        values = {c: shown.get(f"{effect} {c.name}", 0.0) for c in get(effect).coefficients}
+        # without impossible signs
+        effects[effect] = {c.name: x for c, x in values.items() if x > 0.0 or x < 0.0 > c.minimum}
+    if effects[effect_of(Role.ROTOR_DRAG)]:  # a drag at the rotors damps by itself
+        del effects[effect_of(Role.RATE_DAMPING)]
     if late:
-        lag = get(LAG).coefficients[0].name
-        coefficients[Role.LAG] = {lag: estimates[LAG].value}
-    effects = [EffectSetting(effect_of(r), c) for r, c in coefficients.items() if c]
+        effects[LAG] = {get(LAG).coefficients[0].name: estimates[LAG].value}
     if (behind := shown.get("time_offset", 0.0)) > 0.0:
-        effects.append(EffectSetting("latency", {"d": behind}))
+        effects["latency"] = {"d": behind}
     inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
     even = np.allclose(geometry.positions, geometry.arm * QUADRANT)
     vehicle = Vehicle(
@@ -87,7 +86,7 @@ def vehicle_of(
         spin=model.spin.copy(),
         rotor_positions=None if even else geometry.positions,
         com=np.array([shown.get(f"com {a}", 0.0) for a in "xyz"]),
-        effects=tuple(effects),
+        effects=tuple(EffectSetting(*e) for e in effects.items() if e[1]),
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),
     )
@@ -97,13 +96,6 @@ def vehicle_of(
     noise, rate = sensor_noise(posed, vehicle), 1.0 / median_step(posed.t[posed.valid])
     mocap = Mocap(rate, max(noise.position, 1e-5), max(noise.attitude, 1e-4))
     return replace(vehicle, mocap=mocap)
-
-
-def _coefficients(role: str, shown: Values) -> NamedNumbers:
-    """Return the coefficients of a role's effect, without impossible signs."""
-    effect = effect_of(role)
-    values = {c: shown.get(f"{effect} {c.name}", 0.0) for c in get(effect).coefficients}
-    return {c.name: x for c, x in values.items() if x > 0.0 or (x < 0.0 and c.minimum < 0.0)}
 
 
 def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertainty:
@@ -127,16 +119,3 @@ def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertaint
         arm_l=max(share("arm_l"), default=0.0),
         command=COMMAND_SPREAD if commands else 0.0,
     )
-
-
-def advice_of(estimates: Estimated) -> list[str]:
-    """Return the flights or arguments to add for quantities missing from the logs."""
-    known = estimates | {"lag": estimates[LAG]}
-    if estimates["arm_l"].status == ASSUMED:  # and inertia with it
-        known = {name: e for name, e in known.items() if name not in ("Jxx", "Jyy", "Jzz")}
-    texts = [
-        QUANTITIES["unmeasured"].get(name, text) if math.isnan(known[name].value) else text
-        for name, text in QUANTITIES["advice"].items()
-        if name in known and known[name].status in (ASSUMED, NOTHING)
-    ]
-    return list(dict.fromkeys(texts))

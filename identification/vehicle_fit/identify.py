@@ -21,7 +21,7 @@ from ..logs.flight_log import Logs
 from ..logs.magnitudes import motor_doubts
 from ..logs.screening import convention_doubt
 from ..logs.table import Pair
-from .assemble import advice_of, vehicle_of
+from .assemble import vehicle_of
 from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
 from .closed_loop import UNITS
 from .columns import ANSWERED_HZ
@@ -146,7 +146,7 @@ def identify(
         named,
         fit,
         tuple(notes),
-        tuple(advice_of(named)),
+        tuple(text_of("advice", known=named, lag=LAG).splitlines()),
         tested.errors,
     )
 

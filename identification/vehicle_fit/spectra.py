@@ -15,6 +15,7 @@ import numpy as np
 
 from ...runtime.arrays import Array, Complex, Floats
 from ..logs.table import Pair
+from ..motion.smoothing import mean_square
 
 _SEGMENT = 5.0  # s, length of one transform; the inverse is the step of frequency
 TAPERS = 3  # sine tapers (Riedel and Sidorenko, 1995): a low leak, and little lost
@@ -67,8 +68,7 @@ def residual_spectra(segments: Sequence[Segment], residuals: Sequence[Complex]) 
     Segments of a log stand together.
     """
     out: Spectra = []
-    powers = [(np.abs(x) ** 2).mean(axis=0) for x in residuals]
-    pairs = zip(segments, powers, strict=True)
+    pairs = zip(segments, (mean_square(np.abs(x)) for x in residuals), strict=True)
     for _, group in itertools.groupby(pairs, key=lambda pair: pair[0].log):
         of_log, each = zip(*group, strict=True)
         frequency = np.concatenate([s.frequency for s in of_log])
