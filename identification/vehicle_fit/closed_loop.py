@@ -87,12 +87,11 @@ def fit_loop(
         norms = np.linalg.norm(e, axis=-1)
         least = np.maximum(0.5 * np.median(norms, axis=(0, 1)), _LEAST)
         root = np.sqrt(np.maximum(norms, least))[..., None]
-        moves = _STEP * np.eye(len(x))
-        slopes = np.array([(off(x + move) - e) / root for move in moves]) / _STEP
-        strength = _PRIOR * ((e / root) ** 2).sum()
-        gram = np.tensordot(slopes, slopes, (range(1, 5), range(1, 5)))
-        gram += strength * np.eye(len(x))
-        gradients = np.vstack([np.einsum("pntqi,ntqi->np", slopes, e / root), strength * x])
+        residual, one = e / root, np.eye(len(x))
+        slopes = np.array([(off(x + move) - e) / root for move in _STEP * one]) / _STEP
+        strength = _PRIOR * (residual**2).sum()
+        gram = np.einsum("intqc,jntqc->ij", slopes, slopes, optimize=True) + strength * one
+        gradients = np.vstack([np.einsum("intqc,ntqc->ni", slopes, residual), strength * x])
         before = _loss(e, x)
         for _ in range(6):
             lower = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))

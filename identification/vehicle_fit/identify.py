@@ -229,23 +229,22 @@ def _first_fit(pieces: Pieces, basic: Model) -> VehicleFit:
         sure = lag > _LEAST_LAG * (lag - low) / other.width
         return other if sure and plain.loss - other.loss > _cost(plain, 1) else plain
     nonlinear = ("delay", *(("gamma",) if basic.voltage_ref > 0.0 else ()), "lag")
-    best, lags = None, [*_LAGS]
+    least, best, lags = math.inf, None, [*_LAGS]
     # from the richest curve down: a poor first fit takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         model, start = first_model(pieces, replace(basic, exponents=exponents), *nonlinear)
-        starts = ([*start[:-1], lag] for lag in lags)
-        fits = (_aligned(solve(pieces, model, np.array(x))) for x in starts)
+        fits = [_aligned(solve(pieces, model, np.append(start[:-1], lag))) for lag in lags]
         fit = min(fits, key=lambda f: f.loss)
         cost = fit.loss + _cost(fit, len(exponents))
         thrust = [thrust_of(fit.values, u) for u in np.linspace(0.05, 1.0, 20)]
         rises = np.all(np.diff(thrust) > 0.0)  # with the command, from nothing to full
-        if rises and (best is None or cost < best[0]):
-            best, lags = (cost, fit), [fit.values["lag"]]
+        if rises and cost < least:
+            least, best, lags = cost, fit, [fit.values["lag"]]
     if best is None:
         raise InputError(
             "thrust does not grow with the motor commands; expected cmd1..cmd4, 0 to 1"
         )
-    return best[1]
+    return best
 
 
 def _aligned(fit: VehicleFit) -> VehicleFit:

@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 
 from ...runtime.arrays import Array, Complex, Floats, Index, Mask
 from ...runtime.errors import InputError
-from ..logs.table import NamedNumbers, Values
+from ..logs.table import ArrayPair, NamedNumbers, Values
 from .channels import Pieces
 from .columns import BalanceSpectra, balance
 from .geometry import Interval
@@ -119,7 +119,8 @@ def solve(pieces: Pieces, model: Model, theta: Array) -> VehicleFit:
         residuals = _residuals(made, spectra, theta, information)
         spectra = residual_spectra(made.segments, residuals)
     grams = _grams(made, spectra)
-    _, information, rows, left = _newton(made, grams.sum(axis=0), theta)
+    _, information = _newton(made, grams.sum(axis=0), theta)
+    left, rows = slopes(made.combined, theta)
     scores = np.array([np.einsum("iac,acd,ad->i", rows, g, left, optimize=True) for g in grams])
     # twice the negative log-likelihood of noise with the residual's spectrum
     unknown = _unknown(made, spectra, theta)
@@ -178,7 +179,7 @@ def score_tests(
     """
     model, start = fit.model.with_more(fit.theta, *(p for group in groups.values() for p in group))
     made = fit.balance._replace(model=model)
-    step, information, *_ = _newton(made, _grams(made, fit.spectra).sum(axis=0), start)
+    step, information = _newton(made, _grams(made, fit.spectra).sum(axis=0), start)
     slope, own, tests = information @ step, range(len(fit.theta)), {}
     for name, group in groups.items():
         at = [*own, *(model.free.index(p) for p in group)]  # the fit's own parameters follow
@@ -198,7 +199,7 @@ def _moved(
     """
     moved = 0.0
     for _ in range(steps):
-        step, information, *_ = _newton(made, grams, theta)
+        step, information = _newton(made, grams, theta)
         theta = theta + np.clip(step, -1.0, 1.0)
         for name, x in made.centre.items():
             i = made.model.free.index(name)
@@ -242,10 +243,9 @@ def _unknown(made: BalanceSpectra, spectra: Spectra, theta: Array) -> Spectra:
     return out
 
 
-def _newton(made: BalanceSpectra, grams: Array, theta: Array) -> tuple[Array, Array, Array, Array]:
-    """Return a Gauss-Newton step (p,), the information (p, p), and slopes (p, 6, 1 + ...) of the
-    residual's combination of measurement and columns, and the combination (6, 1 + ...).
-    """
+def _newton(made: BalanceSpectra, grams: Array, theta: Array) -> ArrayPair:
+    """Return a Gauss-Newton step (p,), and the information (p, p)."""
+    # the residual's combination (6, 1 + ...) of measurement and columns, and slopes (p, ...)
     (left, rows), model = slopes(made.combined, theta), made.model
     weighted = np.einsum("iac,acd->iad", rows, grams)
     strength = np.square(
@@ -256,7 +256,7 @@ def _newton(made: BalanceSpectra, grams: Array, theta: Array) -> tuple[Array, Ar
     # parameters without excitation stay
     information = (axes * np.maximum(told, 0.0)) @ axes.T + np.diag(strength + 1e-8)
     gradient = np.einsum("iad,ad->i", weighted, left) + theta * strength
-    return np.linalg.solve(information, -gradient), information, rows, left
+    return np.linalg.solve(information, -gradient), information
 
 
 def _residuals(
