@@ -10,25 +10,20 @@ import numpy as np
 from ...runtime.drawing import AFTER, BEFORE, BLACK, GREY, new_figure, room_above, styled
 from ...runtime.page_files import page_template, write_json, write_png
 from ...runtime.plain_values import plain
-from ..logs.table import Data, Values
+from ..logs.table import Data
 from ..logs.what_flew import PLACES
 from .change import SURE, Change
 from .fault_detection import ROTORS, RotorFault
 
-_NAMED = 0.05  # least probability of a rival in the sentence
 
-
-def _undecided(chances: Values) -> str:
-    """Return a sentence on an unsure finding and its rivals."""
-    order = sorted(chances.items(), key=itemgetter(1), reverse=True)
-    named = ", ".join(f"{name} {chance:.2f}" for name, chance in order if chance >= _NAMED)
-    return f"Undecided, by probability: {named}."
+def _headline(**given: Any) -> str:
+    """Return the sentence on a finding with some ``chances``."""
+    return page_template(__package__, "templates/headline.j2", html=False).render(**given)
 
 
 def change_headline(change: Change) -> str:
     """Return a sentence on the change, with its probability."""
-    text = page_template(__package__, "templates/change.j2", html=False)
-    return text.render(change=change, undecided=_undecided(change.probabilities), sure=SURE)
+    return _headline(chances=change.probabilities, change=change, sure=SURE)
 
 
 def change_data(change: Change) -> Data:
@@ -90,9 +85,8 @@ def _in_words(fault: RotorFault, cause: str) -> str:
 
 def fault_headline(fault: RotorFault) -> str:
     """Return a sentence on the rotor fault, its time and size, with its probability."""
-    undecided = _undecided({_in_words(fault, x): p for x, p in fault.probabilities.items()})
-    text = page_template(__package__, "templates/fault.j2", html=False)
-    return text.render(fault=fault, undecided=undecided, cause=_in_words(fault, fault.found))
+    chances = {_in_words(fault, cause): p for cause, p in fault.probabilities.items()}
+    return _headline(chances=chances, fault=fault, cause=_in_words(fault, fault.found))
 
 
 def fault_data(fault: RotorFault) -> Data:

@@ -12,12 +12,6 @@ def effect_of(role: str) -> str:
 LAG = effect_of(Role.LAG)
 
 
-def estimate_name(role: str, index: int) -> str:
-    """Return the name of a role's estimate: effect and coefficient."""
-    effect = effect_of(role)
-    return f"{effect} {get(effect).coefficients[index].name}"
-
-
 def coefficient_of(vehicle: Vehicle, role: Role, index: int) -> float:
     """Return a coefficient of a vehicle's effects of a role; 0 without one."""
     return sum(

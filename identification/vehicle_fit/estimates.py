@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
-from ...dynamics.effects import Role
+from ...dynamics.effects import Role, get
 from ...runtime.errors import InputError
 from ..logs.table import Values
-from .effect_settings import LAG, estimate_name
+from .effect_settings import LAG, effect_of
 from .geometry import FLAT, GYRATION, VOLTAGE_EXPONENTS, YAW_REACH, Interval
 from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Estimated, told
@@ -263,4 +263,6 @@ def _air(fit: VehicleFit, arm: Interval) -> Estimates:
 
 def _of_effect(role: str, index: int, known: Interval, how: str, doubt: str) -> Estimate:
     """Return the estimate of a coefficient of a role's effect."""
-    return _estimate(estimate_name(role, index), known, Role(role).units[index], how, doubt)
+    effect = effect_of(role)
+    coefficient = get(effect).coefficients[index]
+    return _estimate(f"{effect} {coefficient.name}", known, coefficient.unit, how, doubt)

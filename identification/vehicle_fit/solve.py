@@ -122,13 +122,7 @@ def solve(pieces: Pieces, model: Model, theta: Array) -> VehicleFit:
     _, information = _newton(made, grams.sum(axis=0), theta)
     left, rows = slopes(made.combined, theta)
     scores = np.array([np.einsum("iac,acd,ad->i", rows, g, left, optimize=True) for g in grams])
-    # twice the negative log-likelihood of noise with the residual's spectrum
-    unknown = _unknown(made, spectra, theta)
-    logs = (
-        (s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p))).sum()
-        for s, p in zip(made.segments, unknown, strict=True)
-    )
-    return VehicleFit(theta, information, scores, TAPERS * sum(logs), made, spectra)
+    return VehicleFit(theta, information, scores, _loss(made, spectra, theta), made, spectra)
 
 
 def refitted(fit: VehicleFit, fold: Index) -> list[tuple[Mask, VehicleFit]]:
@@ -227,20 +221,23 @@ def _grams(made: BalanceSpectra, spectra: Spectra) -> Array:
     return np.array(grams)
 
 
-def _unknown(made: BalanceSpectra, spectra: Spectra, theta: Array) -> Spectra:
-    """Return the residual's spectrum (m, 6) without the part known from the measured speeds.
+def _loss(made: BalanceSpectra, spectra: Spectra, theta: Array) -> float:
+    """Return twice the negative log-likelihood of noise with the residual's spectrum (m, 6) in each
+    segment, without the part known from the measured speeds.
 
     Their noise is a part of both: of noise n in the power P of a column, Wiener's filter knows
     n^2 / P. Else a lag, by smoothing the noise of measured speeds, would be likelier than none.
     """
-    noise, out = (made.noise**2).sum(axis=0), []  # (c,), per Hz
+    noise, total = (made.noise**2).sum(axis=0), 0.0  # (c,), per Hz
     columns = slice(6, 6 + len(noise))
     powers = residual_spectra(made.segments, [s.columns[:, :, columns] for s in made.segments])
     gains = made.combined(theta)[:, 1 : 1 + len(noise)] ** 2
     for s, spectrum, power in zip(made.segments, spectra, powers, strict=True):
         known = (np.outer(s.passed, noise) ** 2 / power) @ gains.T
-        out.append(np.maximum(spectrum - known, _UNKNOWN * spectrum))
-    return out
+        unknown = np.maximum(spectrum - known, _UNKNOWN * spectrum)
+        logs = np.log(np.where(np.isinf(unknown), 1.0, unknown))
+        total += TAPERS * (s.weight @ logs).sum()
+    return total
 
 
 def _newton(made: BalanceSpectra, grams: Array, theta: Array) -> ArrayPair:
