@@ -63,7 +63,11 @@ class FaultBalance:
         count = w.shape[1]
         self.curve = curve
         self.rows = slice(BEFORE, count - AFTER)
-        self.ramps = _ramps(lag)
+        lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], 4)[:, None]
+        elapsed = np.arange(2 + math.ceil(4.0 * lag / STEP)) - STARTS[:, None]
+        since = STEP * np.maximum(elapsed, 0.0)
+        # integral of 1 - exp(-since / lag)
+        self.ramps = np.diff(since + lags * np.expm1(-since / lags)) / STEP
         self.thrust = thrust = samples.thrust(lag, *curve)
         # free columns: a bias, damping and the gyroscopic moment
         free = [[np.ones(count), w[i], w[i - 2] * w[i - 1]] for i in range(3)]
@@ -97,15 +101,6 @@ class FaultBalance:
     def steps(self, rows: slice, ramps: Array) -> Array:
         """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
         return np.array([sum(c.steps(rows, ramp) for c in self.channels) for ramp in ramps])
-
-
-def _ramps(lag: float) -> Array:
-    """Return the elapsed shares of a loss; see ``FaultBalance``."""
-    lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], 4)[:, None]
-    elapsed = np.arange(2 + math.ceil(4.0 * lag / STEP)) - STARTS[:, None]
-    since = STEP * np.maximum(elapsed, 0.0)
-    # integral of 1 - exp(-since / lag)
-    return np.asarray(np.diff(since + lags * np.expm1(-since / lags)) / STEP)
 
 
 class _BalanceChannel:

@@ -27,7 +27,7 @@ from .closed_loop import UNITS
 from .columns import ANSWERED_HZ
 from .effect_settings import LAG
 from .estimates import estimates_of, thrust_of
-from .geometry import Geometry
+from .geometry import Geometry, Interval
 from .held_out import HeldOut, held_out, loops_of, models_of
 from .model import Model
 from .motors import motor_response
@@ -263,24 +263,21 @@ def _agreeing(fit: VehicleFit) -> VehicleFit:
     """
     for band in _BANDS:
         slow = fit.again(band=band)
-        wide, narrow = _hover_thrust(fit), _hover_thrust(slow)
-        apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
+        (wide, *_), (narrow, low, _) = _hover_thrust(fit), _hover_thrust(slow)
         credible = abs(fit.values.get("force bias z", 0.0)) < _APART * FORCE_BIAS
-        if credible and apart <= _APART * math.hypot(narrow[1], _CLOSE):
-            return fit
+        if credible and min(wide, narrow) > 0.0:
+            deviation = math.hypot(math.log(narrow / low) / slow.width, _CLOSE)
+            if abs(math.log(narrow / wide)) <= _APART * deviation:
+                return fit
         fit = slow
     return fit
 
 
-def _hover_thrust(fit: VehicleFit) -> Pair:
-    """Return thrust as a share of the weight, at the hover speed or command of the fit's start, and
-    its relative standard deviation.
-    """
-    weight = fit.model.weight
+def _hover_thrust(fit: VehicleFit) -> Interval:
+    """Return one rotor's thrust at the hover speed or command of the fit's start."""
     # the start's curve carries the weight here; each power carries its share
-    u = math.sqrt(weight / (4.0 * fit.model.scale["a2"]))
-    value, low, _ = fit.interval(lambda v: 4.0 * thrust_of(v, u) / weight, False)
-    return value, (value - low) / (fit.width * max(abs(value), 1e-9))
+    u = math.sqrt(fit.model.weight / (4.0 * fit.model.scale["a2"]))
+    return fit.interval(lambda v: thrust_of(v, u))
 
 
 def _cost(fit: VehicleFit, parameters: int) -> float:
