@@ -99,8 +99,8 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     # the last batch may be a short one
     means = [thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() >= 0.5 * BATCH]
     std = np.std(features_of(np.array(means)), axis=0, ddof=1) / math.sqrt(len(means))
-    known = None if log.voltage is None else log.voltage[steady & (log.voltage > 0.0)]
-    voltage = math.nan if known is None or not known.size else known.mean()
+    known = np.zeros(0) if log.voltage is None else log.voltage[steady & (log.voltage > 0.0)]
+    voltage = known.mean() if known.size else math.nan
     return Trim(name, seconds, mean / mean.sum(), mean.sum(), std, voltage)
 
 

@@ -15,7 +15,7 @@ from ...dynamics.vehicle import (
     Vehicle,
 )
 from ..logs.flight_log import Logs
-from ..logs.table import NamedNumbers, median_step
+from ..logs.table import median_step
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import LAG, effect_of
 from .geometry import (
@@ -59,7 +59,7 @@ def vehicle_of(
         if motors is not None:  # thrust against command by way of the speed
             curve = MotorCurve(tuple(k * np.polynomial.polynomial.polypow(motors.speed, 2)))
     late = "lag" in model.free
-    effects: dict[str, NamedNumbers] = {}
+    effects = {}
     for effect in [effect_of(further.role) for further in FURTHER.values() if further.role]:
         values = {c: shown.get(f"{effect} {c.name}", 0.0) for c in get(effect).coefficients}
         # without impossible signs
@@ -90,12 +90,12 @@ def vehicle_of(
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),
     )
-    posed = next((log for log in logs if log.has_pose), None)
-    if posed is None:
-        return vehicle
-    noise, rate = sensor_noise(posed, vehicle), 1.0 / median_step(posed.t[posed.valid])
-    mocap = Mocap(rate, max(noise.position, 1e-5), max(noise.attitude, 1e-4))
-    return replace(vehicle, mocap=mocap)
+    for log in logs:
+        if log.has_pose:
+            noise, rate = sensor_noise(log, vehicle), 1.0 / median_step(log.t[log.valid])
+            mocap = Mocap(rate, max(noise.position, 1e-5), max(noise.attitude, 1e-4))
+            return replace(vehicle, mocap=mocap)
+    return vehicle
 
 
 def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertainty:

@@ -16,7 +16,7 @@ from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
 from ..logs.flight_phases import carried
-from ..logs.table import Data, Pair, median_step
+from ..logs.table import Pair, median_step
 from ..motion.signals import Signals, in_body, log_signals, pose_pieces, voltage_at
 from ..motion.smoothing import (
     derivative,
@@ -67,7 +67,7 @@ class MotionPiece(NamedTuple):
 
     def mapped(self, change: Callable[[Array], Any], *names: str) -> "MotionPiece":
         """Return the piece with each of its series changed, or these alone."""
-        some: Data = {name: getattr(self, name) for name in names or self._fields}
+        some = {name: getattr(self, name) for name in names or self._fields}
         return self._replace(**{n: change(x) for n, x in some.items() if np.ndim(x)})
 
 

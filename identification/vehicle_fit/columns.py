@@ -42,7 +42,7 @@ class BalanceSpectra(NamedTuple):
     centre: NamedNumbers  # nonlinear parameters: the columns are linear about them
     names: Names  # columns; the rotors' are the last
     rotors: int  # the number of these
-    segments: tuple[Segment, ...]
+    segments: list[Segment]
     seconds: float
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
@@ -61,7 +61,7 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about the nonlinear parameters of ``theta``."""
     values = model.values(theta)
     centre = {name: values[name] for name in NONLINEAR if name in values}
-    segments: list[Segment] = []
+    segments = []
     for whole in pieces:
         late, ends = round(model.late / whole.period), round(MARGIN / whole.period)
         piece, inner = whole.set_back(late), slice(ends, len(whole.t) - ends)
@@ -88,7 +88,7 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
         size = model.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
         for letter, share in model.shares.items():
             noise[:, names.index(f"{letter}2")] = size * share
-    sizes = len(rotors), tuple(segments), seconds.sum()
+    sizes = len(rotors), segments, seconds.sum()
     return BalanceSpectra(pieces, model, centre, names, *sizes, noise)
 
 
@@ -98,7 +98,7 @@ def rotor_columns(piece: MotionPiece, model: Model, values: Values) -> NamedArra
     battery = np.ones(1)
     if model.voltage_ref > 0.0 and piece.voltage is not None:
         battery = np.power(piece.voltage / model.voltage_ref, values.get("gamma", 0.0))
-    out: NamedArrays = {}
+    out = {}
     for exponent in model.exponents:
         thrust = speed**exponent * battery[:, None]
         for letter, share in model.shares.items():

@@ -18,8 +18,8 @@ from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Estimated, told
 from .solve import Function, VehicleFit
 
-UNKNOWN: Interval = (math.nan, math.nan, math.nan)
-UNIT: Interval = (1.0, 1.0, 1.0)
+UNKNOWN = (math.nan, math.nan, math.nan)
+UNIT = (1.0, 1.0, 1.0)
 Estimates = Iterator[Estimate]
 
 

@@ -19,7 +19,6 @@ either axis, ``rotor_dyn_coef`` 1/s, ``drag_matrix`` N/(m/s) along body axes, ne
 """
 
 import math
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -90,7 +89,7 @@ _ARDUPILOT = {
     "MOT_THST_HOVER": math.inf,
     "MOT_THST_EXPO": math.inf,
 }
-EXPORTS: dict[str, Callable[[Identified], str]] = {
+EXPORTS = {
     "px4": partial(_autopilot, "param set %s %.4g", _PX4),
     "ardupilot": partial(_autopilot, "%s,%.4g", _ARDUPILOT),
     "rotorpy": partial(_simulator, "rotorpy"),

@@ -95,7 +95,9 @@ def inertia_of(p: Values) -> Array:
 
 
 def coefficients(model: Model, p: Values, names: Names) -> Array:
-    """Return the coefficients (6, c) of the columns for parameters in SI units."""
+    """Return the coefficients (6, c) of the columns for parameters in SI units; the first ten are
+    the constant, angular acceleration, and the products of angular velocities.
+    """
     inertia, lever = inertia_of(p), np.array([p["rx"], p["ry"], p["rz"]])
     out = np.zeros((6, len(names)))
     for column, name in enumerate(names):
@@ -111,14 +113,11 @@ def coefficients(model: Model, p: Values, names: Names) -> Array:
             # the slow part stands behind
             out[row, column + 1] = -p.get(f"answered {axis}", 0.0) * out[row, column]
     out[:3] /= model.mass
-    # behind the constant: angular acceleration, and the products of angular velocities
-    one = names.index("1")
-    turning, products = slice(one + 1, one + 4), slice(one + 4, one + 10)
-    out[:3, turning] = _CROSS @ lever
-    out[:3, products] = (_PICK @ lever).T - np.outer(lever, _PICK.trace(axis1=1, axis2=2))
-    out[3:, products] = -np.einsum("ijk,pkj->ip", _CROSS, inertia @ _PICK)
+    out[:3, 1:4] = _CROSS @ lever
+    out[:3, 4:10] = (_PICK @ lever).T - np.outer(lever, _PICK.trace(axis1=1, axis2=2))
+    out[3:, 4:10] = -np.einsum("ijk,pkj->ip", _CROSS, inertia @ _PICK)
     out[3:] = np.linalg.solve(inertia, out[3:])
-    out[:, one] = [p.get(f"{kind} bias {a}", 0.0) for kind in ("force", "turn") for a in "xyz"]
+    out[:, 0] = [p.get(f"{kind} bias {a}", 0.0) for kind in ("force", "turn") for a in "xyz"]
     return out
 
 

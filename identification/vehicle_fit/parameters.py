@@ -41,7 +41,7 @@ _FIRST_DELAYS = np.linspace(0.0, 0.08, 9)
 _OPPOSED = 0.15
 _SWING_HZ = (0.5, 8.0)
 
-QUANTITIES: Data = read_yaml(Path(__file__).with_name("quantities.yaml"), "quantities")
+QUANTITIES = read_yaml(Path(__file__).with_name("quantities.yaml"), "quantities")
 
 
 class Further(NamedTuple):
@@ -57,7 +57,7 @@ class Further(NamedTuple):
     positive: bool = True
 
 
-FURTHER: dict[str, Further] = {n: Further(**row) for n, row in QUANTITIES["effects"].items()}
+FURTHER = {n: Further(**row) for n, row in QUANTITIES["effects"].items()}
 
 
 def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, Array]:

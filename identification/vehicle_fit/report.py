@@ -20,7 +20,7 @@ from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
 from .held_out import LEAST_HZ, powers
 from .model import coefficients
-from .result import ASSUMED, NOTHING, Identified, text_of
+from .result import Identified, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,9 +67,7 @@ def headline(identified: Identified) -> str:
     """Return one sentence: parts refuted by held-out flight, identified quantities with half of
     their 95 % interval, and assumed ones.
     """
-    thrust = "thrust(0.5)" if identified.fit.model.commands else "k"
-    shown = [identified.estimates[name] for name in (thrust, "Jxx", "Jyy", "Jzz", "p/k")]
-    return text_of("headline", v=identified.vehicle, shown=shown)
+    return text_of("headline", it=identified)
 
 
 def use_of(identified: Identified) -> str:
@@ -79,11 +77,7 @@ def use_of(identified: Identified) -> str:
 
 def reasons_of(found: Identified) -> list[str]:
     """Return why quantities are assumed or not identifiable, a line for each reason."""
-    names: dict[str, list[str]] = {}
-    for e in found.estimates.values():
-        if e.status in (ASSUMED, NOTHING):
-            names.setdefault(e.how.removeprefix(f"{NOTHING}: "), []).append(e.name)
-    return [f"{', '.join(of)}: {why}" for why, of in names.items()]
+    return text_of("reasons", estimates=found.estimates).splitlines()
 
 
 def table_of(errors: PredictionErrors, simplest: PredictionErrors) -> list[Names]:
@@ -129,12 +123,9 @@ def _fitted(identified: Identified, piece: MotionPiece) -> list[Array]:
     Both are (n, 6), behind the picture's low-pass and within the band of the fit.
     """
     fit = identified.fit
-    then = piece.t - fit.values["delay"]
-    columns = {
-        n: np.interp(then, piece.t, x)
-        for n, x in rotor_columns(piece, fit.model, fit.values).items()
-    }
-    columns |= air_columns(piece, fit.model)
+    then, columns = piece.t - fit.values["delay"], air_columns(piece, fit.model)
+    for name, x in rotor_columns(piece, fit.model, fit.values).items():
+        columns[name] = np.interp(then, piece.t, x)
     gains = coefficients(fit.model, fit.values, tuple(columns))
     model = np.column_stack(list(columns.values())) @ gains.T
     shown_hz = min(_SHOWN_HZ, fit.model.band)

@@ -67,7 +67,7 @@ def residual_spectra(segments: Sequence[Segment], residuals: Sequence[Complex]) 
     power, smoothed over the segments of a log and over frequency, infinite where there is none.
     Segments of a log stand together.
     """
-    out: Spectra = []
+    out = []
     pairs = zip(segments, (mean_square(np.abs(x)) for x in residuals), strict=True)
     for _, group in itertools.groupby(pairs, key=lambda pair: pair[0].log):
         of_log, each = zip(*group, strict=True)
