@@ -74,8 +74,12 @@ class FaultBalance:
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
         free[2].extend(turning[:2])
         # each channel's moment, free columns and measurement
-        rows = zip(SIGNS, [*free, []], [*turning, samples.specific_force], strict=True)
-        columns = [np.array([thrust @ signs, *own, y]) for signs, own, y in rows]
+        columns = [
+            np.array([thrust @ signs, *own, y])
+            for signs, own, y in zip(
+                SIGNS, [*free, []], [*turning, samples.specific_force], strict=True
+            )
+        ]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
         away += _TURNING * (w**2).sum(axis=0) + samples.between
         # at the start of a fault the error of its shape grows with the acceleration

@@ -53,8 +53,8 @@ class BalanceSpectra(NamedTuple):
         values = self.model.values(theta)
         gains = coefficients(self.model, values, self.names)
         late = gains[:, -self.rotors :]
-        moved = (late * (values[name] - x) for name, x in self.centre.items())
-        return np.column_stack([np.ones(6), -gains, *(-x for x in moved)])
+        moved = [late * (values[name] - x) for name, x in self.centre.items()]
+        return -np.column_stack([-np.ones(6), gains, *moved])
 
 
 def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
@@ -105,10 +105,10 @@ def rotor_columns(piece: MotionPiece, model: Model, values: Values) -> NamedArra
             out[name := f"{letter}{exponent}"] = thrust @ share
             if letter != "T":
                 out[f"slow {name}"] = low_pass(out[name], ANSWERED_HZ, piece.period)
-    momentum, w = speed @ model.spin, piece.angular_velocity
-    smooth = low_pass(momentum, 2.0 * BAND, piece.period)
-    out["Mz Jr"] = -derivative(smooth[:, None], piece.period)[:, 0]
-    out["Mx Jr"], out["My Jr"] = -w[:, 1] * momentum, w[:, 0] * momentum
+    momentum = speed @ model.spin[:, None]  # (n, 1)
+    across, smooth = piece.angular_velocity * momentum, low_pass(momentum, 2.0 * BAND, piece.period)
+    out["Mz Jr"] = -derivative(smooth, piece.period)[:, 0]
+    out["Mx Jr"], out["My Jr"] = -across[:, 1], across[:, 0]
     if piece.velocity is not None:
         drag = -speed[:, :, None] * _local(piece, piece.velocity, model)
         for i, axis in enumerate("xyz"):

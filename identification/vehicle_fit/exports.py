@@ -52,8 +52,8 @@ def _autopilot(line: str, most: Values, identified: Identified) -> str:
         share = np.clip(bent @ (thrust / thrust[-1] - u) / (bent @ bent), 0.0, 1.0)
         values[3:] = vehicle.weight / (4.0 * thrust[-1]), share
     known = {p: x for p, x in zip(most, values, strict=True) if np.isfinite(x)}
-    full = identified.estimates.get("thrust(1)")
-    return text_of("autopilot", line=line, values=known, most=most, full=full).removesuffix("\n")
+    estimates = identified.estimates
+    return text_of("autopilot", line=line, values=known, most=most, estimates=estimates)
 
 
 def _simulator(name: str, identified: Identified) -> str:
@@ -64,15 +64,13 @@ def _simulator(name: str, identified: Identified) -> str:
         name,
         v=v,
         notes=text_of("notes", v=v, estimates=known, commands=identified.fit.model.commands),
-        positions=(v.positions - v.com).tolist(),
         lag=lag if lag > 0.0 else None,
         drag=-np.diag(drag) if any(drag) else None,
-        linear_drag=0.5 * sum(coefficient_of(v, Role.ROTOR_DRAG, i) for i in range(2)),
         effect=partial(coefficient_of, v),
         mixing=np.sign(v.mixing[1:, ::-1]),  # the Crazyflie counts from front-right to front-left
         per_rpm=_PER_RPM,
         Role=Role,
-    ).removesuffix("\n")
+    )
 
 
 _PX4 = {

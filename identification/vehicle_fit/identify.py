@@ -131,8 +131,9 @@ def identify(
     named, vehicle = described(fit, tested.why)
     check_thrust(vehicle, not basic.commands, logs[0].name)
     _, excess = nearest_body(fit)
-    limits = {"band": BAND, "answered_hz": ANSWERED_HZ, "apart": _APART}
-    notes += text_of("doubts", fit=fit, excess=excess, **limits).splitlines()
+    notes += text_of(
+        "doubts", fit=fit, excess=excess, band=BAND, answered_hz=ANSWERED_HZ, apart=_APART
+    ).splitlines()
     vehicle = _with_status(vehicle, named, tested)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(fit)

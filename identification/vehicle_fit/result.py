@@ -27,7 +27,8 @@ def told(known: Interval) -> bool:
 
 def text_of(template: str, **given: Any) -> str:
     """Return the text of one of ``templates/``."""
-    return page_template(__package__, f"templates/{template}.j2", html=False).render(**given)
+    text = page_template(__package__, f"templates/{template}.j2", html=False).render(**given)
+    return text.removesuffix("\n")
 
 
 class Estimate(NamedTuple):

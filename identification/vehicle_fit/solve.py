@@ -6,7 +6,7 @@ shrink the coefficients, so the addition is taken off before the normal equation
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -125,23 +125,22 @@ def solve(pieces: Pieces, model: Model, theta: Array) -> VehicleFit:
     return VehicleFit(theta, information, scores, _loss(made, spectra, theta), made, spectra)
 
 
-def refitted(fit: VehicleFit, fold: Index) -> list[tuple[Mask, VehicleFit]]:
-    """Return, without each number of ``fold`` (s,) in turn, the segments (s,) kept, and the
+def refitted(fit: VehicleFit, fold: Index) -> Iterator[tuple[Mask, VehicleFit]]:
+    """Yield, without each number of ``fold`` (s,) in turn, the segments (s,) kept, and the
     coefficients by these alone, at the same spectrum of the noise.
 
     Raises:
         InputError: no segment is kept.
     """
-    grams, out = _grams(fit.balance, fit.spectra), []
+    grams = _grams(fit.balance, fit.spectra)
     for held in np.unique(fold):
         keep = fold != held
         if not keep.any():
             raise InputError("the flight is too short; expected 7.5 s in flight without a break")
         total = grams[keep].sum(axis=0)
         theta, information, _ = _moved(fit.balance, total, fit.theta, _ROUNDS)
-        part = replace(fit, theta=theta, information=information, scores=fit.scores[keep])
-        out.append((keep, part))
-    return out
+        scores = fit.scores[keep]
+        yield keep, replace(fit, theta=theta, information=information, scores=scores)
 
 
 def nearest_body(fit: VehicleFit) -> tuple[VehicleFit, float]:
@@ -258,16 +257,15 @@ def _newton(made: BalanceSpectra, grams: Array, theta: Array) -> ArrayPair:
 
 def _residuals(
     made: BalanceSpectra, spectra: Spectra, theta: Array, information: Array
-) -> list[Complex]:
-    """Return the residual's transforms (K, m, 6) in each segment, as large as before the parameters
+) -> Iterator[Complex]:
+    """Yield the residual's transforms (K, m, 6) in each segment, as large as before the parameters
     took their share: parameters told by few frequencies follow the noise most.
     """
     left, rows = (x[..., 1:] for x in slopes(made.combined, theta))
-    inverse, out = np.linalg.inv(information), []
+    inverse = np.linalg.inv(information)
     for s, spectrum in zip(made.segments, spectra, strict=True):
         columns = s.columns[:, :, 6:]
         moves = np.tensordot(columns, rows, (2, 2))  # (tapers, m, p, 6)
         share = np.einsum("kmia,ij,kmja->kma", moves.conj(), inverse, moves, optimize=True).real
         leverage = np.minimum(share.mean(axis=0) / spectrum, _MOST_LEVERAGE)
-        out.append((s.columns[:, :, :6] + columns @ left.T) / np.sqrt(1.0 - leverage))
-    return out
+        yield (s.columns[:, :, :6] + columns @ left.T) / np.sqrt(1.0 - leverage)

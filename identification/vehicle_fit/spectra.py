@@ -8,7 +8,7 @@ section 13.4).
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -41,11 +41,13 @@ class Segment(NamedTuple):
     columns: Complex  # (K, m, c): per root Hz
 
 
-def segments_of(columns: Array, t: Array, period: float, log: int, band: float) -> list[Segment]:
-    """Return the transforms of a piece's columns (n, c) at times (n,), cut into segments of about
+def segments_of(
+    columns: Array, t: Array, period: float, log: int, band: float
+) -> Iterator[Segment]:
+    """Yield the transforms of a piece's columns (n, c) at times (n,), cut into segments of about
     equal length.
     """
-    out, n = [], len(columns)
+    n = len(columns)
     edges = np.linspace(0, n, 1 + max(1, round(n * period / _SEGMENT))).astype(np.int64)
     for a, b in itertools.pairwise(edges):
         size = b - a
@@ -58,11 +60,10 @@ def segments_of(columns: Array, t: Array, period: float, log: int, band: float) 
         tapers = np.sqrt(2.0 * period / (size + 1)) * waves
         transforms = np.fft.rfft(tapers * columns[a:b], axis=1)[:, inside]
         passed = 1.0 / (1.0 + (frequency / band) ** 4) ** 2
-        out.append(Segment(log, (t[a], t[b - 1]), frequency, weight, passed, transforms))
-    return out
+        yield Segment(log, (t[a], t[b - 1]), frequency, weight, passed, transforms)
 
 
-def residual_spectra(segments: Sequence[Segment], residuals: Sequence[Complex]) -> Spectra:
+def residual_spectra(segments: Iterable[Segment], residuals: Iterable[Complex]) -> Spectra:
     """Return, for each segment, the spectrum (m, c) of residuals with transforms (K, m, c): their
     power, smoothed over the segments of a log and over frequency, infinite where there is none.
     Segments of a log stand together.
