@@ -17,7 +17,15 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
 from ..logs.flight_phases import carried
 from ..logs.table import Pair, median_step
-from ..motion.signals import Signals, in_body, log_signals, pose_pieces, voltage_at
+from ..motion.signals import (
+    LONGEST_GAP,
+    SHORTEST_PIECE,
+    Signals,
+    in_body,
+    log_signals,
+    pose_pieces,
+    voltage_at,
+)
 from ..motion.smoothing import (
     derivative,
     low_pass,
@@ -28,8 +36,6 @@ from ..motion.smoothing import (
 )
 from .geometry import GRAVITY
 
-_SHORTEST_PIECE = 3.0  # s; shorter ones have no frequency low enough to tell a bias
-_GAP = 0.1  # s without a sample: a piece ends
 # Hz, low-pass of angular velocity and velocity as factors of products: it passes a quadrotor's
 # motion and keeps out noise, which a product squares
 _PRODUCT_HZ = 8.0
@@ -53,13 +59,6 @@ class MotionPiece(NamedTuple):
     rotors: Array = np.empty((0, 4))
     command: Array | None = None  # (n, 4), 0 to 1
     voltage: Array | None = None  # (n,) V
-
-    def set_back(self, late: int) -> "MotionPiece":
-        """Return the piece with its rotors ``late`` samples later; the first or last sample holds
-        at the end.
-        """
-        rows = np.clip(np.arange(len(self.t)) - late, 0, len(self.t) - 1)
-        return self.mapped(itemgetter(rows), "rotors", "voltage")
 
     def measured(self) -> Array:
         """Return specific force and angular acceleration (n, 6)."""
@@ -164,7 +163,7 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     pieces, sources = moving or pieces, replace(sources, velocity=bool(moving))
     if not pieces:
         raise InputError(
-            f"{logs[0].name}: no piece of {_SHORTEST_PIECE:g} s in flight is unbroken "
+            f"{logs[0].name}: no piece of {SHORTEST_PIECE:g} s in flight is unbroken "
             "in pose and sensors; expected a longer flight, or another --from and --to"
         )
     return pieces, sources
@@ -203,7 +202,7 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
     period = median_step(log.t[read])
-    for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
+    for rows in unbroken(log.t, read, max(LONGEST_GAP, 3.5 * period), 15, SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, "gyro", t)
         force = np.full_like(rate, np.nan)
@@ -252,5 +251,5 @@ def _cut(piece: MotionPiece, keep: Mask) -> Pieces:
     return [
         piece.mapped(itemgetter(slice(a, b)))
         for a, b in runs_of(keep)
-        if (b - a) * piece.period >= _SHORTEST_PIECE
+        if (b - a) * piece.period >= SHORTEST_PIECE
     ]

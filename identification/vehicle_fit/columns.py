@@ -11,6 +11,7 @@ A column of one parameter has the name of its axis and of the parameter: ``Fx ro
 lift``.
 """
 
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +65,10 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
     segments = []
     for whole in pieces:
         late, ends = round(model.late / whole.period), round(MARGIN / whole.period)
-        piece, inner = whole.set_back(late), slice(ends, len(whole.t) - ends)
+        # the rotors' first or last sample holds at the end
+        rows = np.clip(np.arange(len(whole.t)) - late, 0, len(whole.t) - 1)
+        piece = whole.mapped(itemgetter(rows), "rotors", "voltage")
+        inner = slice(ends, len(whole.t) - ends)
         air, rotors = air_columns(piece, model), rotor_columns(piece, model, centre)
         base = np.column_stack([*rotors.values()])
         parts = [np.nan_to_num(piece.measured()), *air.values(), base]

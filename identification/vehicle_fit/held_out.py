@@ -33,7 +33,6 @@ from ..prediction import (
 from .closed_loop import LoopFit, fit_loop
 from .model import coefficients
 from .solve import VehicleFit, refitted
-from .spectra import Spectra
 
 FOLDS = 3  # every third segment is held out at a time
 LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
@@ -220,15 +219,15 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
     return HeldOut({}, "torque" if force else WHOLE)
 
 
-def powers(fit: VehicleFit, spectra: Spectra | None = None) -> Array:
+def powers(fit: VehicleFit, by_noise: bool = False) -> Array:
     """Return the power that a fit leaves of specific force and turning in each segment, and all
-    power (s, 2, 6), from ``LEAST_HZ`` on. ``spectra`` divide the power of each frequency.
+    power (s, 2, 6), from ``LEAST_HZ`` on; ``by_noise``: each frequency's over that of the noise.
     """
     names, out = fit.balance.names, []
     model = coefficients(fit.model, fit.values, names)
-    for i, s in enumerate(fit.balance.segments):
+    for s, spectrum in zip(fit.balance.segments, fit.spectra, strict=True):
         inside = s.frequency >= LEAST_HZ
-        unit = 1.0 if spectra is None else spectra[i][inside]
+        unit = spectrum[inside] if by_noise else 1.0
         measured = s.columns[:, inside, :6]
         residual = measured - s.columns[:, inside, 6 : 6 + len(names)] @ model.T
         both = np.abs([residual, measured])

@@ -158,12 +158,11 @@ def _with_status(vehicle: Vehicle, named: Estimated, tested: HeldOut) -> Vehicle
     """
     models = models_of(vehicle)
     if tested.loop is not None:
-        vehicle = replace(vehicle, closed_loop=tested.loop.loop)
+        loop, deviations = tested.loop
+        vehicle = replace(vehicle, closed_loop=loop)
         stands = REFUTED if tested.stands in models else IDENTIFIED
         models |= loops_of(vehicle)
-        for size, (c, unit), value in zip(
-            tested.loop.deviations, UNITS.items(), astuple(tested.loop.loop), strict=True
-        ):
+        for size, (c, unit), value in zip(deviations, UNITS.items(), astuple(loop), strict=True):
             name, wide = f"closed_loop {c}", 1.96 * size
             if size > 0.0:
                 shows = (stands, LOOP) if abs(value) > wide else (NOTHING, HIDDEN)

@@ -137,7 +137,7 @@ def explained(identified: Identified) -> Array:
     band. Each frequency counts by its ratio to the noise; NaN without a measurement.
     """
     fit = identified.fit
-    left, total = powers(fit, fit.spectra).sum(axis=0)
+    left, total = powers(fit, by_noise=True).sum(axis=0)
     return np.asarray(np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0))
 
 
