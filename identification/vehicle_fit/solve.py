@@ -228,11 +228,11 @@ def _loss(made: BalanceSpectra, spectra: Spectra, theta: Array) -> float:
     n^2 / P. Else a lag, by smoothing the noise of measured speeds, would be likelier than none.
     """
     noise, total = (made.noise**2).sum(axis=0), 0.0  # (c,), per Hz
-    columns = slice(6, 6 + len(noise))
-    powers = residual_spectra(made.segments, [s.columns[:, :, columns] for s in made.segments])
-    gains = made.combined(theta)[:, 1 : 1 + len(noise)] ** 2
+    at = np.flatnonzero(noise)
+    powers = residual_spectra(made.segments, [s.columns[:, :, 6 + at] for s in made.segments])
+    gains = made.combined(theta)[:, 1 + at] ** 2
     for s, spectrum, power in zip(made.segments, spectra, powers, strict=True):
-        known = (np.outer(s.passed, noise) ** 2 / power) @ gains.T
+        known = (np.outer(s.passed, noise[at]) ** 2 / power) @ gains.T
         unknown = np.maximum(spectrum - known, _UNKNOWN * spectrum)
         logs = np.log(np.where(np.isinf(unknown), 1.0, unknown))
         total += TAPERS * (s.weight @ logs).sum()
