@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.arrays import Array
+from ...runtime.arrays import Array, Mask
 from ..logs.table import NamedArrays, NamedNumbers, Names, Values
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece, Pieces
@@ -46,6 +46,11 @@ class BalanceSpectra(NamedTuple):
     segments: list[Segment]
     seconds: float
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
+
+    @property
+    def slow(self) -> Mask:
+        """Whether a column (c,) is the slow part of the one before."""
+        return np.array([name.startswith("slow ") for name in self.names])
 
     def combined(self, theta: Array) -> Array:
         """Return the residual as a combination (6, 1 + ...) of a measured axis and all
@@ -91,7 +96,8 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
         squares = [p.period * (4.0 * p.rotors**2).mean(axis=0) for p in pieces]
         size = model.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
         for letter, share in model.shares.items():
-            noise[:, names.index(f"{letter}2")] = size * share
+            for name in {f"{letter}2", f"slow {letter}2"}.intersection(names):
+                noise[:, names.index(name)] = size * share
     sizes = len(rotors), segments, seconds.sum()
     return BalanceSpectra(pieces, model, centre, names, *sizes, noise)
 

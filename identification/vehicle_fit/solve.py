@@ -18,10 +18,10 @@ from ...runtime.arrays import Array, Complex, Floats, Index, Mask
 from ...runtime.errors import InputError
 from ..logs.table import ArrayPair, NamedNumbers, Values
 from .channels import Pieces
-from .columns import BalanceSpectra, balance
+from .columns import ANSWERED_HZ, BalanceSpectra, balance
 from .geometry import Interval
 from .model import LOGARITHMIC, Model, slopes
-from .spectra import LOSS, TAPERS, Spectra, residual_spectra
+from .spectra import LOSS, TAPERS, Segment, Spectra, residual_spectra
 
 Function = Callable[[Values], float]
 
@@ -209,13 +209,13 @@ def _grams(made: BalanceSpectra, spectra: Spectra) -> Array:
     noise, own = made.noise.T @ made.noise, slice(1, 1 + len(made.names))
     grams = []
     for s, spectrum in zip(made.segments, spectra, strict=True):
-        gram = []
+        gains, gram = _gains(made, s), []
         for axis, weight in enumerate(s.weight / spectrum.T):
             both = s.columns[:, :, [axis, *range(6, s.columns.shape[2])]]
             scaled = (both * np.sqrt(weight)[:, None]).reshape(-1, both.shape[2])
             parts = np.concatenate([scaled.real, scaled.imag])
             gram.append(parts.T @ parts)
-            gram[axis][own, own] -= noise * (weight @ s.passed * TAPERS)
+            gram[axis][own, own] -= noise * (gains.T * weight @ gains * TAPERS)
         grams.append(gram)
     return np.array(grams)
 
@@ -228,15 +228,25 @@ def _loss(made: BalanceSpectra, spectra: Spectra, theta: Array) -> float:
     n^2 / P. Else a lag, by smoothing the noise of measured speeds, would be likelier than none.
     """
     noise, total = (made.noise**2).sum(axis=0), 0.0  # (c,), per Hz
-    at = np.flatnonzero(noise)
+    at = np.flatnonzero(noise * ~made.slow)
     powers = residual_spectra(made.segments, [s.columns[:, :, 6 + at] for s in made.segments])
-    gains = made.combined(theta)[:, 1 + at] ** 2
+    combined = made.combined(theta)[:, 1 : 1 + len(noise)]  # (6, c)
+    # a slow part stands behind its column, and has the same noise
+    whole = (np.eye(len(noise)) + np.eye(len(noise), k=-1) * made.slow[:, None])[:, at]
     for s, spectrum, power in zip(made.segments, spectra, powers, strict=True):
-        known = (np.outer(s.passed, noise[at]) ** 2 / power) @ gains.T
+        gains = _gains(made, s)[:, None]  # (m, 1, c)
+        known = (combined * gains) @ whole * gains[..., at] * noise[at]  # (m, 6, ...)
+        known = (known**2 / power[:, None]).sum(axis=2)
         unknown = np.maximum(spectrum - known, _UNKNOWN * spectrum)
         logs = np.log(np.where(np.isinf(unknown), 1.0, unknown))
         total += TAPERS * (s.weight @ logs).sum()
     return total
+
+
+def _gains(made: BalanceSpectra, s: Segment) -> Floats:
+    """Return the shares (m, c) of amplitudes behind the columns' low-passes."""
+    slow = 1.0 / (1.0 + (s.frequency[:, None] / ANSWERED_HZ) ** 4)
+    return s.passed[:, None] * np.where(made.slow, slow, 1.0)
 
 
 def _newton(made: BalanceSpectra, grams: Array, theta: Array) -> ArrayPair:

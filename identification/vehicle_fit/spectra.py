@@ -37,7 +37,7 @@ class Segment(NamedTuple):
     span: Pair  # s, first and last sample
     frequency: Floats  # (m,) Hz
     weight: Array  # (m,): 2 of a complex number, 1 of a real one; over the number of tapers
-    passed: Floats  # (m,): share of a power behind the columns' low-pass
+    passed: Floats  # (m,): share of an amplitude behind the columns' low-pass
     columns: Complex  # (K, m, c): per root Hz
 
 
@@ -59,7 +59,7 @@ def segments_of(
         waves = np.sin(np.outer(np.arange(1, TAPERS + 1), places))[..., None]
         tapers = np.sqrt(2.0 * period / (size + 1)) * waves
         transforms = np.fft.rfft(tapers * columns[a:b], axis=1)[:, inside]
-        passed = 1.0 / (1.0 + (frequency / band) ** 4) ** 2
+        passed = 1.0 / (1.0 + (frequency / band) ** 4)
         yield Segment(log, (t[a], t[b - 1]), frequency, weight, passed, transforms)
 
 
