@@ -99,8 +99,8 @@ def vehicle_of(
 
 
 def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertainty:
-    """Return the standard deviations of the 95 % intervals, thrust's with the spread from day to
-    day. The deviation of the given mass is not known.
+    """Return the standard deviations of the 95 % intervals. The deviation of the given mass is not
+    known.
     """
 
     def share(*names: str) -> list[float]:
@@ -109,13 +109,13 @@ def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertaint
 
     centre = [e for n in ("com x", "com y") if (e := estimates[n]).status != NOTHING]
     return Uncertainty(
-        thrust=math.hypot(
-            min(share("k", "thrust(0.25)", "thrust(0.5)", "thrust(0.75)"), default=0.0),
-            THRUST_SPREAD,
-        ),
+        thrust=min(share("k"), default=THRUST_SPREAD),
         rotor=max((min((e.high - e.low) / 1.96 / arm, 0.99) for e in centre), default=0.0),
         torque=max(share("p/k"), default=0.0),
         inertia=max(share("Jxx", "Jyy", "Jzz"), default=0.0),
         arm_l=max(share("arm_l"), default=0.0),
-        command=COMMAND_SPREAD if commands else 0.0,
+        command=min(
+            share("thrust(0.25)", "thrust(0.5)", "thrust(0.75)"),
+            default=COMMAND_SPREAD if commands else 0.0,
+        ),
     )

@@ -13,7 +13,15 @@ from ...dynamics.effects import Role, get
 from ...runtime.errors import InputError
 from ..logs.table import Values
 from .effect_settings import LAG, effect_of
-from .geometry import FLAT, GYRATION, VOLTAGE_EXPONENTS, YAW_REACH, Interval
+from .geometry import (
+    COMMAND_SPREAD,
+    FLAT,
+    GYRATION,
+    THRUST_SPREAD,
+    VOLTAGE_EXPONENTS,
+    YAW_REACH,
+    Interval,
+)
 from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Estimated, told
 from .solve import Function, VehicleFit
@@ -61,8 +69,15 @@ def _estimate(
     return Estimate(name, *known, unit, status, how)
 
 
-def _positive(fit: VehicleFit, name: str, what: str | Function, unit: str, how: str) -> Estimate:
-    known = fit.interval(what)
+def _positive(
+    fit: VehicleFit, name: str, what: str | Function, unit: str, how: str, spread: float = 0.0
+) -> Estimate:
+    """Return the estimate of a positive quantity with a spread from day to day, as a share."""
+    known = value, low, high = fit.interval(what)
+    if spread and low > 0.0:
+        factor = math.exp(math.hypot(math.log(high / value), 1.96 * spread))
+        known = value, value / factor, value * factor
+        how = f"{how}; the interval has {100.0 * spread:g} % from day to day"
     wide = f"{how}: the interval is wider than half the value"
     return _estimate(name, known, unit, how, "" if told(known) else wide)
 
@@ -72,7 +87,7 @@ def _thrust(fit: VehicleFit) -> Estimates:
     of, pieces = fit.model.sources, fit.balance.pieces
     how = f"{of.force} along body z against {of.rotors}, with the mass given"
     if not fit.model.commands:
-        yield _positive(fit, "k", "a2", "N/(rad/s)^2", how)
+        yield _positive(fit, "k", "a2", "N/(rad/s)^2", how, THRUST_SPREAD)
         return
     for e in fit.model.exponents:
         yield _estimate(f"thrust u^{e}", fit.interval(f"a{e}", False), "N", how)
@@ -82,7 +97,7 @@ def _thrust(fit: VehicleFit) -> Estimates:
     for u in (0.25, 0.5, 0.75, 1.0):
         name, thrust = f"thrust({u:g})", partial(thrust_of, u=u)
         if low <= u <= high:
-            yield _positive(fit, name, thrust, "N", how)
+            yield _positive(fit, name, thrust, "N", how, COMMAND_SPREAD)
         else:
             yield _estimate(name, fit.interval(thrust), "N", beyond, status=ASSUMED)
 
