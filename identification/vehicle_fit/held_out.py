@@ -122,7 +122,7 @@ def held_out(
     Raises:
         InputError: too little would be left of the logs.
     """
-    if not all(log.has_pose for log in logs):
+    if not fit.model.sources.velocity:
         return _by_balance(fit)
     whole = vehicle_of(fit, "")
     parts = _held_parts(logs, fit, whole)

@@ -15,11 +15,12 @@ import numpy as np
 
 from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
+from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
 from ..logs.flight_log import FlightLog, Logs
 from ..logs.magnitudes import motor_doubts
-from ..logs.screening import convention_doubt
+from ..logs.screening import check_conventions
 from ..logs.table import Pair
 from .assemble import advice_of, vehicle_of
 from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
@@ -27,7 +28,7 @@ from .closed_loop import UNITS
 from .columns import ANSWERED_HZ
 from .effect_settings import effect_of
 from .estimates import estimates_of, thrust_of
-from .geometry import Geometry
+from .geometry import YAW_REACH, Geometry
 from .held_out import HeldOut, held_out, loops_of, models_of
 from .model import Model
 from .motors import motor_response
@@ -51,6 +52,9 @@ _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
 _NO_OFFSET = 1e-6  # s, deviation of an absent time offset
 _ALIGNMENTS = 4  # at most, each by the offset of the fit before
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
+# largest thrust of the same rotor speeds among flights over the smallest: to 1.035 within each of
+# four vehicles (64 measured flights)
+_ALIKE = 1.1
 WITHOUT_FORCE = "an unchanged velocity predicts data outside the fit better than the force"
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 HIDDEN = "the interval of the flight loop's reaction holds 0"
@@ -148,6 +152,12 @@ def identify(
             f"warning: turning shows a principal inertia {excess:.1f} standard deviations above "
             "the sum of the other two, the most that a body has: something else turns the vehicle"
         )
+    reach, (low, high) = named["p/k"], named["arm_l"].value * np.array(YAW_REACH[1:])
+    if reach.low > high or reach.high < low:
+        notes.append(
+            f"warning: p/k is {reach.value:.3g} m; expected {low:.3g} to {high:.3g} m on this arm: "
+            "something else turns the vehicle in yaw"
+        )
     vehicle = _with_status(vehicle, named, tested)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(fit)
@@ -219,13 +229,33 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
     for log in logs:
         for wrong in motor_doubts(log):
             raise InputError(f"{log.name}: {wrong}")
+    _check_alike(pieces, logs)
     return pieces, sources
 
 
+def _check_alike(pieces: Pieces, logs: Logs) -> None:
+    """Check that the same rotor speeds give the same thrust on each flight.
+
+    Raises:
+        InputError: they do not: several vehicles, masses or propellers flew.
+    """
+    sums: dict[int, Array] = {}
+    for piece in pieces:
+        if piece.rotor_speeds is not None:
+            both = piece.specific_force[:, 2].sum(), np.square(piece.rotor_speeds).sum()
+            sums[piece.log] = np.add(sums.get(piece.log, 0.0), both)
+    thrusts = sorted((force / square, logs[i].name) for i, (force, square) in sums.items())
+    if thrusts and thrusts[-1][0] > _ALIKE * thrusts[0][0]:
+        (low, one), *_, (high, other) = thrusts
+        raise InputError(
+            f"{other}: the same rotor speeds give {high / low - 1.0:.0%} more thrust than on "
+            f"{one}; expected flights of one vehicle with one mass and one set of propellers"
+        )
+
+
 def _doubts(log: FlightLog) -> Iterator[str]:
-    """Yield reasons to doubt the axes and the mass of a log."""
-    if text := convention_doubt(log, None):
-        yield text
+    """Yield reasons to doubt the clock and the mass of a log."""
+    yield from check_conventions(log, None)
     if "payload_position" in log.extra:
         yield "a load is tracked: --mass is that of the vehicle with its load"
 

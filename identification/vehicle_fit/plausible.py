@@ -33,8 +33,10 @@ def check_thrust(vehicle: Vehicle, measured: bool, log: str) -> None:
     if not measured or low <= coefficient <= high:
         return
     usual = math.sqrt(coefficient / math.sqrt(low * high))
+    factor, size = (usual, "small") if usual > 1.0 else (1.0 / usual, "large")
     raise InputError(
         f"{log}: rotor speeds: thrust coefficient {coefficient:.3g} with a rotor radius of "
-        f"{radius:.3g} m; expected {low:g} to {high:g}. The speeds are about {usual:.2g} times too "
-        f"{'small' if usual > 1.0 else 'large'} to be rad/s: check their unit in the log or the map"
+        f"{radius:.3g} m; expected {low:g} to {high:g}. For this mass and geometry the speeds are "
+        f"about {factor:.2g} times too {size} to be rad/s: check their unit in the log or the map, "
+        "--mass and --geometry"
     )
