@@ -170,7 +170,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     # less of the weight is no turning rotor, in whatever unit
     if most < 0.003:
         yield _Refused(
-            f"omega1..omega4 are at rest all the time, so nothing flew; expected {hover}"
+            "omega1..omega4 are at rest all the time, or too slow for the "
+            f"{vehicle.mass:g} kg of {vehicle.name}, so nothing flew; expected {hover}"
         )
     if not np.isfinite(most):
         yield _Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")

@@ -15,7 +15,6 @@ import numpy as np
 
 from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
-from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
 from ..logs.flight_log import FlightLog, Logs
@@ -118,11 +117,9 @@ def identify(
     report(0.5, "asking what else shows")
     fit = _with_optional(fit)
     if "answered torque" in fit.kept:
-        shares = ", ".join(f"{100 * fit.values[f'answered {a}']:.0f} %" for a in "xyz")
         notes.append(
-            f"below {ANSWERED_HZ:g} Hz {shares} of the rotors' torque about x, y and z turn "
-            "nothing: the flight loop answers moments that nothing measures. Inertia is told by "
-            "what is quicker"
+            f"below {ANSWERED_HZ:g} Hz the flight loop answers moments that nothing measures: part "
+            "of the rotors' torque turns nothing there, and quicker torque alone tells inertia"
         )
     report(0.8, "asking what can be told")
     if fit.model.opposite:
@@ -223,34 +220,25 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
     """Return the pieces of the logs for an identification, and their sensors.
 
     Raises:
-        InputError: the logs lack a channel, or their motors are doubtful.
+        InputError: the logs lack a channel, their motors are doubtful, or several vehicles flew.
     """
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
     for log in logs:
         for wrong in motor_doubts(log):
             raise InputError(f"{log.name}: {wrong}")
-    _check_alike(pieces, logs)
-    return pieces, sources
-
-
-def _check_alike(pieces: Pieces, logs: Logs) -> None:
-    """Check that the same rotor speeds give the same thrust on each flight.
-
-    Raises:
-        InputError: they do not: several vehicles, masses or propellers flew.
-    """
-    sums: dict[int, Array] = {}
-    for piece in pieces:
-        if piece.rotor_speeds is not None:
-            both = piece.specific_force[:, 2].sum(), np.square(piece.rotor_speeds).sum()
-            sums[piece.log] = np.add(sums.get(piece.log, 0.0), both)
-    thrusts = sorted((force / square, logs[i].name) for i, (force, square) in sums.items())
+    thrusts = sorted(
+        (piece.specific_force[:, 2].sum() / np.square(piece.rotor_speeds).sum(), piece.log)
+        for piece in pieces
+        if piece.rotor_speeds is not None
+    )
     if thrusts and thrusts[-1][0] > _ALIKE * thrusts[0][0]:
         (low, one), *_, (high, other) = thrusts
         raise InputError(
-            f"{other}: the same rotor speeds give {high / low - 1.0:.0%} more thrust than on "
-            f"{one}; expected flights of one vehicle with one mass and one set of propellers"
+            f"{logs[other].name}: the same rotor speeds give {high / low - 1.0:.0%} more thrust "
+            f"than on {logs[one].name}; expected flights of one vehicle with one mass and one set "
+            "of propellers"
         )
+    return pieces, sources
 
 
 def _doubts(log: FlightLog) -> Iterator[str]:

@@ -191,7 +191,7 @@ TORN = {
     ),
     "at rest": (
         lambda log: replace(log, rotor_speeds=0.0 * log.rotor_speeds),
-        "omega1..omega4 are at rest all the time",
+        "omega1..omega4 are at rest all the time, or too slow for the 0.465 kg of ardrone2",
     ),
     "dead column": (
         lambda log: replace(log, rotor_speeds=log.rotor_speeds * [1, 1, 0, 1]),
