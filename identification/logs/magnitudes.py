@@ -231,6 +231,11 @@ def unit_doubts(log: FlightLog, vehicle: SomeVehicle) -> Lines:
                 f"within {LARGEST:g}"
             )
     doubts = [time_doubt(log.period), *motor_doubts(log)]
+    spread = np.ptp(log.position[log.valid], axis=0).max() if log.has_pose else 0.0
+    if spread > 300.0:
+        doubts.append(
+            f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres"
+        )
     if vehicle is not None and log.has_rotor_speeds:
         doubts.append(rotor_doubt(_thrust_by_weight(log.rotor_speeds, vehicle), vehicle))
     return [doubt for doubt in doubts if doubt]
