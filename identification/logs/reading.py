@@ -99,8 +99,7 @@ def read_log(
     """
     path = Path(path) if isinstance(path, str) else path
     with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for themselves
-        log = _read(path, reader, vehicle, map, piece)
-    return finished(log, vehicle)
+        return finished(_read(path, reader, vehicle, map, piece), vehicle)
 
 
 def finished(log: FlightLog, vehicle: SomeVehicle) -> FlightLog:
