@@ -127,7 +127,7 @@ def check_conventions(log: FlightLog, vehicle: SomeVehicle) -> Lines:
             the advice that leaves a consistent log.
     """
     by_imu, source = reads_imu(log), log.source or log.name or "log"
-    for text in _held(log):
+    for text in _held(log) if vehicle is None else ():  # else checked with the poses
         raise InputError(f"{source}: {text}")
     if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
         return []
@@ -253,12 +253,10 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
 
 def _held(log: FlightLog) -> _Findings:
     """Check for a position and an attitude that change."""
-    for name, x in {
-        "position (px, py, pz)": log.position,
-        "attitude (qw ... qz)": log.quaternion,
-    }.items():
+    kinds = _Refused("position (px, py, pz)"), _Fault("attitude (qw to qz)")
+    for name, x in zip(kinds, (log.position, log.quaternion), strict=True):
         if is_stuck(x[log.valid]):
-            yield _Refused(
+            yield type(name)(
                 f"the {name} never changes, to the last digit; expected the poses of a flight"
             )
 

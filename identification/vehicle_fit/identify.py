@@ -8,7 +8,7 @@ are fixed by a named assumption, or left out.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from ...dynamics.effects import Role
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
-from ..logs.flight_log import FlightLog, Logs
+from ..logs.flight_log import Logs
 from ..logs.magnitudes import motor_doubts
 from ..logs.screening import check_conventions
 from ..logs.table import Pair
@@ -93,7 +93,9 @@ def identify(
     broken = "left out: no piece of 3 s in flight is unbroken in pose and sensors"
     notes = []
     for i, log in enumerate(logs):
-        doubts = _doubts(log) if i in kept else [broken]
+        doubts = check_conventions(log, None) if i in kept else [broken]
+        if "payload_position" in log.extra:
+            doubts.append("a load is tracked: --mass is that of the vehicle with its load")
         notes += [f"warning: {log.name}: {text}" for text in doubts]
     logs = [logs[i] for i in kept]
     basic = Model(
@@ -239,13 +241,6 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
             "of propellers"
         )
     return pieces, sources
-
-
-def _doubts(log: FlightLog) -> Iterator[str]:
-    """Yield reasons to doubt the clock and the mass of a log."""
-    yield from check_conventions(log, None)
-    if "payload_position" in log.extra:
-        yield "a load is tracked: --mass is that of the vehicle with its load"
 
 
 def _voltage(pieces: Pieces) -> float:

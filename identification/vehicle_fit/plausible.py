@@ -33,10 +33,9 @@ def check_thrust(vehicle: Vehicle, measured: bool, log: str) -> None:
     if not measured or low <= coefficient <= high:
         return
     usual = math.sqrt(coefficient / math.sqrt(low * high))
-    factor, size = (usual, "small") if usual > 1.0 else (1.0 / usual, "large")
     raise InputError(
         f"{log}: rotor speeds: thrust coefficient {coefficient:.3g} with a rotor radius of "
-        f"{radius:.3g} m; expected {low:g} to {high:g}. For this mass and geometry the speeds are "
-        f"about {factor:.2g} times too {size} to be rad/s: check their unit in the log or the map, "
-        "--mass and --geometry"
+        f"{radius:.3g} m; expected {low:g} to {high:g}. With this mass and geometry, speeds "
+        f"in rad/s would be about {usual:.2g} times as large: check their unit in the log or the "
+        "map, --mass and --geometry"
     )

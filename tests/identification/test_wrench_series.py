@@ -237,8 +237,8 @@ def test_a_log_that_was_filtered_before_it_was_written_has_no_tuning_to_fit():
     """A hover whose pose has no noise: neither pose noise nor walk is found."""
     t = 0.005 * np.arange(800)
     log = held_flight(t, lift=0.0)
-    wave = 1e-7 * np.sin(t)[:, None]  # or each pose repeats the last one
-    position, quaternion = log.position[0] + wave, log.quaternion[0] + wave
+    position = log.position[0] + 1e-7 * np.sin(t)[:, None]  # or each pose repeats the last one
+    quaternion = np.tile(log.quaternion[0], (len(t), 1))
     with refused("filtered before it was written") as caught:
         tune_to_log(replace(log, position=position, quaternion=quaternion), VEHICLE)
     assert "\n" not in str(caught.value)

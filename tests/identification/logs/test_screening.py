@@ -258,7 +258,7 @@ def test_a_pose_without_a_change_is_refused(channel):
     log = flight()
     still = replace(log, **{channel: 0 * getattr(log, channel) + 0.5})
     with refused(r"flight.csv: the (position|attitude) \(.* never changes"):
-        screen_log(still, VEHICLE, None)
+        screen_log(still, VEHICLE)
 
 
 def test_rotors_that_stop_or_race_are_named():
