@@ -97,7 +97,7 @@ def held_out(
     Raises:
         InputError: too little would be left of the logs.
     """
-    if not all(log.has_pose for log in logs):
+    if not fit.model.sources.velocity:
         return _by_balance(fit)
     whole, starts, segments = vehicle_of(fit, ""), [], fit.balance.segments
     number = np.array([s.log for s in segments])

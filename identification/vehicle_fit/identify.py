@@ -19,7 +19,7 @@ from ...runtime.errors import InputError
 from ...runtime.threads import one_thread
 from ..logs.flight_log import Logs
 from ..logs.magnitudes import motor_doubts
-from ..logs.screening import convention_doubt
+from ..logs.screening import check_conventions
 from ..logs.table import Pair
 from .assemble import vehicle_of
 from .channels import Pieces, Sources, pieces_of, rounding_step, speed_noise
@@ -27,7 +27,7 @@ from .closed_loop import UNITS
 from .columns import ANSWERED_HZ
 from .effect_settings import LAG
 from .estimates import estimates_of, thrust_of
-from .geometry import Geometry, Interval
+from .geometry import YAW_REACH, Geometry, Interval
 from .held_out import HeldOut, held_out, loops_of, models_of
 from .model import Model
 from .motors import motor_response
@@ -61,6 +61,9 @@ _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
 _NO_OFFSET = 1e-6  # s, deviation of an absent time offset
 _ALIGNMENTS = 4  # at most, each by the offset of the fit before
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
+# largest thrust of the same rotor speeds among flights over the smallest: to 1.035 within each of
+# four vehicles (64 measured flights)
+_ALIKE = 1.1
 WITHOUT_FORCE = "an unchanged velocity predicts data outside the fit better than the force"
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 HIDDEN = "the interval of the flight loop's reaction holds 0"
@@ -101,9 +104,10 @@ def identify(
     for i, log in enumerate(logs):
         doubts = ["left out: no piece of 3 s in flight is unbroken in pose and sensors"]
         if i in kept:
-            load = "a load is tracked: --mass is that of the vehicle with its load"
-            doubts = [convention_doubt(log, None), load * ("payload_position" in log.extra)]
-        notes += [f"warning: {log.name}: {text}" for text in doubts if text]
+            doubts = check_conventions(log, None)
+        if "payload_position" in log.extra:
+            doubts.append("a load is tracked: --mass is that of the vehicle with its load")
+        notes += [f"warning: {log.name}: {text}" for text in doubts]
     logs = [logs[i] for i in kept]
     basic, step = Model(mass, geometry, sources, voltage_ref=_voltage(pieces)), 0.0
     if not basic.commands:
@@ -131,9 +135,8 @@ def identify(
     named, vehicle = described(fit, tested.why)
     check_thrust(vehicle, not basic.commands, logs[0].name)
     _, excess = nearest_body(fit)
-    notes += text_of(
-        "doubts", fit=fit, excess=excess, band=BAND, answered_hz=ANSWERED_HZ, apart=_APART
-    ).splitlines()
+    given = {"band": BAND, "answered_hz": ANSWERED_HZ, "apart": _APART, "usual": YAW_REACH}
+    notes += text_of("doubts", fit=fit, excess=excess, named=named, **given).splitlines()
     vehicle = _with_status(vehicle, named, tested)
     if "lag" in fit.model.free:
         named["lag without offset"] = _lag_alone(fit)
@@ -197,12 +200,20 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
     """Return the pieces of the logs for an identification, and their sensors.
 
     Raises:
-        InputError: the logs lack a channel, or their motors are doubtful.
+        InputError: the logs lack a channel, their motors are doubtful, or several vehicles flew.
     """
     pieces, sources = pieces_of(logs, windows or [(0.0, math.inf)] * len(logs))
     for log in logs:
         for wrong in motor_doubts(log):
             raise InputError(f"{log.name}: {wrong}")
+    each = [(p.specific_force[:, 2].sum() / np.square(p.rotors).sum(), p.log) for p in pieces]
+    (low, one), (high, other) = min(each), max(each)
+    if sources.rotors == "rotor speeds" and high > _ALIKE * low:
+        raise InputError(
+            f"{logs[other].name}: the same rotor speeds give {high / low - 1.0:.0%} more thrust "
+            f"than on {logs[one].name}; expected flights of one vehicle with one mass and one set "
+            "of propellers"
+        )
     return pieces, sources
 
 

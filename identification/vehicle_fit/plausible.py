@@ -32,9 +32,9 @@ def check_thrust(vehicle: Vehicle, measured: bool, log: str) -> None:
     coefficient = vehicle.k[0] / (AIR_DENSITY * disc * radius**2)
     if measured and not low <= coefficient <= high:
         usual = math.sqrt(coefficient / math.sqrt(low * high))
-        wrong = "small" if usual > 1.0 else "large"
         raise InputError(
             f"{log}: rotor speeds: thrust coefficient {coefficient:.3g} with a rotor radius of "
-            f"{radius:.3g} m; expected {low:g} to {high:g}. The speeds are about {usual:.2g} times "
-            f"too {wrong} to be rad/s: check their unit in the log or the map"
+            f"{radius:.3g} m; expected {low:g} to {high:g}. With this mass and geometry, speeds "
+            f"in rad/s would be about {usual:.2g} times as large: check their unit in the log or "
+            "the map, --mass and --geometry"
         )

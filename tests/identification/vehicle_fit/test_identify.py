@@ -199,6 +199,14 @@ def test_a_lag_that_a_time_offset_may_be_is_assumed(inertial):
     assert found.estimates["motor_lag"].status == "assumed"
 
 
+def test_poses_too_seldom_for_a_velocity_leave_the_imu(inertial):
+    log, _ = inertial[0]
+    seldom = np.arange(len(log.t)) % 25 == 0
+    pose = np.where(seldom[:, None], default_rng(0).normal(0.5, 0.001, (len(log.t), 7)), np.nan)
+    log = replace(log, position=pose[:, :3], quaternion=pose[:, 3:], valid=seldom)
+    check(identify([log], MASS, GIVEN), "Jxx", INERTIA[0, 0], 0.05)
+
+
 def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
     log, _ = inertial[0]
     volts = np.linspace(4.2, 3.5, len(log.t))
@@ -376,6 +384,16 @@ def test_rotors_in_another_order_are_refused(inertial):
     wrong = replace(log, command=log.command[:, [3, 2, 1, 0]])
     with refused("roll turns against"):
         identify([wrong], MASS, GIVEN)
+    (flight,) = posed()
+    with refused("the rotors look permuted: .* are rotors 2,1,3,4"):
+        of_crazyflie([replace(flight, rotor_speeds=flight.rotor_speeds[:, [1, 0, 2, 3]])])
+
+
+def test_flights_of_two_vehicles_are_refused():
+    (flight,) = posed()
+    other = replace(flight, name="heavier", rotor_speeds=1.1 * flight.rotor_speeds)
+    with refused("the same rotor speeds give 21% more thrust than on heavier"):
+        of_crazyflie([flight, other])
 
 
 def test_turning_is_compared_with_torque_at_its_own_delay():
