@@ -36,16 +36,19 @@ from windwrench.identification.logs.commanded_speeds import with_commanded_speed
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
+from windwrench.identification.motion.signals import in_body, log_signals
+from windwrench.identification.motion.smoothing import resampled
 from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
+from windwrench.identification.vehicle_fit.columns import balance
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, HeldOut, standing
-from windwrench.identification.vehicle_fit.identify import identify
+from windwrench.identification.vehicle_fit.identify import checked_pieces, identify
 from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
 from windwrench.identification.vehicle_fit.report import explained, headline, use_of
-from windwrench.identification.vehicle_fit.solve import nearest_body
+from windwrench.identification.vehicle_fit.solve import _grams, nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
 
@@ -185,6 +188,37 @@ def test_an_imu_and_commands_are_enough():
     assert vehicle.motor_curve is not None
     thrust = vehicle.commanded_thrust(np.full((1, 4), HOVER))
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
+
+
+def test_quick_changes_of_velocity_are_the_accelerometers():
+    """The noise of a pose made drag too small."""
+    log = recorded(seconds=10.0)
+    (s,) = log_signals(log)
+    felt = in_body(s.acceleration + np.array([0.0, 0.0, 9.81]), s.rotation)
+    imu = resampled(log.t, s.t, np.hstack([felt, s.angular_velocity]))
+    position = log.position + 0.005 * default_rng(0).standard_normal(log.position.shape)
+    blind = replace(log, position=position, gyro=imu[:, 3:])
+    off = []
+    for seen in (blind, replace(blind, accelerometer=imu[:, :3])):
+        ((piece,), _), ((clean,), _) = checked_pieces([seen]), checked_pieces([log])
+        off.append((resampled(clean.t, piece.t, piece.velocity) - clean.velocity)[20:-20].std())
+    assert off[1] < 0.5 * off[0]
+
+
+def test_noise_of_speeds_is_taken_off_slow_torques_too():
+    """A share of answered torque near 1 left less than no power."""
+    rng, t = default_rng(0), np.arange(0.0, 60.0, 0.01)
+    still = np.zeros((len(t), 3))
+    speeds = 500.0 + 5.0 * rng.standard_normal((len(t), 4))
+    piece = MotionPiece(0, t, 0.01, still, still, still, rotors=speeds)
+    sources = Sources("", "gyro", "rotor speeds", False)
+    model = Model(MASS, GIVEN, sources, speed_noise=5.0, free=("delay",))
+    made = balance([piece], model, np.zeros(1))
+    spectra = [np.ones((len(s.frequency), 6)) for s in made.segments]
+    left = np.sum(_grams(made, spectra), axis=0)[3]
+    at = [1 + made.names.index(name) for name in ("x2", "slow x2")]
+    power = sum(np.square(np.abs(s.columns[:, :, at[0] + 5])).sum() for s in made.segments)
+    assert (np.abs(np.diag(left)[at]) < 0.05 * power).all()
 
 
 def test_a_lag_that_a_time_offset_may_be_is_assumed(inertial):
