@@ -41,8 +41,8 @@ from .geometry import GRAVITY
 # motion and keeps out noise, which a product squares
 _PRODUCT_HZ = 8.0
 # Hz: above, velocity is the accelerometer's integral. The pose's noise grows with frequency, and
-# drag of a noisy velocity is too small: on a small quadrotor it was 1.0e-6 N/(rad/s m/s), with
-# 2.7e-6 in the coherence of 0.99 below
+# drag of a noisy velocity is too small: 1.0e-6 N/(rad/s m/s) on a small quadrotor, 2.7e-6 by the
+# coherence of 0.99 below
 _POSED_HZ = 1.0
 # Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
 _FASTEST_HZ = 200.0

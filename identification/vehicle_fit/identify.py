@@ -61,9 +61,9 @@ _LEAST_LAG = 4.0  # standard deviations of a lag behind logged rotor speeds
 _NO_OFFSET = 1e-6  # s, deviation of an absent time offset
 _ALIGNMENTS = 4  # at most, each by the offset of the fit before
 _LAGS = (0.03, 0.08)  # s, starts of the search for a lag
-# largest thrust of the same rotor speeds among flights over the smallest: to 1.035 within each of
-# four vehicles (64 measured flights)
-_ALIKE = 1.1
+# largest thrust of the same rotor speeds among flights over the smallest: 1.035 within each of four
+# vehicles (64 measured flights), 1.15 on a fifth. Above, a warning, and a refusal
+_ALIKE, _OTHER = 1.1, 1.5
 WITHOUT_FORCE = "an unchanged velocity predicts data outside the fit better than the force"
 WITHOUT_EFFECTS = "drag and thrust alone predict data outside the fit better"
 HIDDEN = "the interval of the flight loop's reaction holds 0"
@@ -109,6 +109,8 @@ def identify(
             doubts.append("a load is tracked: --mass is that of the vehicle with its load")
         notes += [f"warning: {log.name}: {text}" for text in doubts]
     logs = [logs[i] for i in kept]
+    if text := _unlike(logs, pieces, sources, _ALIKE):
+        notes.append(f"warning: {text}")
     basic, step = Model(mass, geometry, sources, voltage_ref=_voltage(pieces)), 0.0
     if not basic.commands:
         basic, step = replace(basic, speed_noise=speed_noise(pieces)), rounding_step(logs)
@@ -206,15 +208,22 @@ def checked_pieces(logs: Logs, windows: Sequence[Pair] | None = None) -> tuple[P
     for log in logs:
         for wrong in motor_doubts(log):
             raise InputError(f"{log.name}: {wrong}")
+    if text := _unlike(logs, pieces, sources, _OTHER):
+        raise InputError(text)
+    return pieces, sources
+
+
+def _unlike(logs: Logs, pieces: Pieces, sources: Sources, most: float) -> str:
+    """Return the two flights with thrusts of equal rotor speeds apart by more than a factor."""
     each = [(p.specific_force[:, 2].sum() / np.square(p.rotors).sum(), p.log) for p in pieces]
     (low, one), (high, other) = min(each), max(each)
-    if sources.rotors == "rotor speeds" and high > _ALIKE * low:
-        raise InputError(
-            f"{logs[other].name}: the same rotor speeds give {high / low - 1.0:.0%} more thrust "
-            f"than on {logs[one].name}; expected flights of one vehicle with one mass and one set "
-            "of propellers"
-        )
-    return pieces, sources
+    if sources.rotors == "commands" or not high > most * low:
+        return ""
+    return (
+        f"{logs[other].name}: the same rotor speeds give {high / low - 1.0:.0%} more thrust than "
+        f"on {logs[one].name}; expected flights of one vehicle with one mass and one set of "
+        "propellers"
+    )
 
 
 def _voltage(pieces: Pieces) -> float:
