@@ -181,8 +181,7 @@ def _size(fit: VehicleFit) -> Estimates:
             yield _estimate(f"l/{axis}{axis[1]}", (value, low, high), "1/(kg m)", how)
     for name in ("Jxy", "Jxz", "Jyz") if "products of inertia" in fit.kept else ():
         product = _times(fit.interval(name, False), arm)
-        unsure = fit.doubt or fit.kept["products of inertia"]
-        yield _estimate(name, product, "kg m2", f"{rate} across axes", unsure, status)
+        yield _estimate(name, product, "kg m2", f"{rate} across axes", fit.doubt, status)
 
 
 def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
@@ -258,7 +257,7 @@ def _air(fit: VehicleFit, arm: Interval) -> Estimates:
         if not effect.role or kind not in fit.kept:
             continue
         size = effect.factor * (arm[0] if effect.turns else 1.0)
-        why, how = fit.doubt * effect.turns or fit.kept[kind], effect.how.format(**vars(of))
+        why, how = fit.doubt * effect.turns, effect.how.format(**vars(of))
         for index, parameter in enumerate(effect.parameters, effect.first):
             known = _times(fit.interval(parameter, effect.turns), size)
             estimate = _of_effect(effect.role, index, known, how, why)

@@ -328,7 +328,7 @@ def _with_optional(fit: VehicleFit) -> VehicleFit:
         # the noise of a pose goes round the loop: quick torques then follow noise alone
         and (name != "answered torque" or rate == "gyro")
     }
-    kept: dict[str, str] = {}
+    kept: list[str] = []
     hidden = None
     while offered:
         tests = score_tests(fit, offered)
@@ -343,16 +343,13 @@ def _with_optional(fit: VehicleFit) -> VehicleFit:
         asked = [FURTHER[n] for n in (*kept, name)]
         if all(richer.values[p] > 0.0 for f in asked if f.positive for p in f.parameters):
             fit = richer
-            kept[name] = ""
-    # a later effect may stand for an earlier one
-    while kept and _above(fit, name := min(kept, key=lambda n: _above(fit, n))) < 0.0:
-        del kept[name]
+            kept.append(name)
+    # An effect taken because it stood out is too large on average, if another flight of the same
+    # vehicle would hide it: its interval reaches down to sizes below the bound. The weakest one
+    # leaves, since another may stand for it: of linear and quadratic drag each can be too weak
+    while kept and _above(fit, name := min(kept, key=lambda n: _above(fit, n))) < fit.width:
+        kept.remove(name)
         stays = [p not in FURTHER[name].parameters for p in fit.model.free]
         free = tuple(p for p, stay in zip(fit.model.free, stays, strict=True) if stay)
         fit = fit.again(fit.theta[stays], free=free)
-    # an effect taken because it stood out is too large on average, if another flight of the same
-    # vehicle would hide it: its interval reaches down to sizes below the bound
-    for name in kept:
-        if _above(fit, name) < fit.width:
-            kept[name] = "it shows, but by so little that what shows is too large on average"
-    return replace(fit, kept=kept, hidden=hidden)
+    return replace(fit, kept=tuple(kept), hidden=hidden)

@@ -7,7 +7,7 @@ shrink the coefficients, so the addition is taken off before the normal equation
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 
 from ...runtime.arrays import Array, Complex, Floats, Index, Mask
 from ...runtime.errors import InputError
-from ..logs.table import ArrayPair, NamedNumbers, Values
+from ..logs.table import ArrayPair, NamedNumbers, Names, Values
 from .channels import Pieces
 from .columns import ANSWERED_HZ, BalanceSpectra, balance
 from .geometry import Interval
@@ -47,8 +47,7 @@ class VehicleFit:
     loss: float  # twice the negative log-likelihood, up to a constant
     balance: BalanceSpectra
     spectra: Spectra  # (m, 6) a segment
-    # visible further effects, each with the reason to doubt it, or empty
-    kept: Mapping[str, str] = field(default_factory=dict)
+    kept: Names = ()  # visible further effects
     # an invisible moment of velocity: value, deviation, least visible value
     hidden: Interval | None = None
     doubt: str = ""  # reason to believe no estimate of torque
