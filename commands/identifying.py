@@ -79,6 +79,7 @@ def identify(
         )
     flights = read_logs([path for path, _ in parts], LogOptions(reader, map, piece))
     flights, unseen = flights[: len(logs)], flights[len(logs) :]
+    log_notes(text for flight in flights for text in flight.notes)  # a refusal may follow from one
     for flight in unseen:
         known_pieces(flight)  # refuses one without a pose before the fit
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
@@ -91,7 +92,7 @@ def identify(
         identified = identified._replace(predicted={**identified.predicted, "prediction": further})
     run.record = out.with_name(f"{out.stem}.run.json")
     written = write_identified(identified, out)
-    log_notes([*(text for flight in flights for text in flight.notes), *identified.notes])
+    log_notes(identified.notes)
     sentence = headline(identified)
     console.print(
         f"{identified.fit.balance.seconds:.0f} s of flight, mass {mass:g} kg: {sentence}."

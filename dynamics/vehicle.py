@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 
 # Rotors as in the paper: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right, with x forward and
 # y left.
-_QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
 # Turning sense about body +z; the reaction on the body is opposite: tau_z = M1 - M2 + M3 - M4.
-_SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
+SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
 
 _MOST_POWERS = 6  # coefficients of a motor curve
 
@@ -290,7 +290,7 @@ class Vehicle:
     omega_source: Literal["measured", "commanded"] = "measured"
     voltage_ref: NotNegative = 0.0
     gravity: Positive = 9.81
-    spin: TurningSense = field(default_factory=_SPIN.copy)
+    spin: TurningSense = field(default_factory=SPIN.copy)
     rotor_positions: Annotated[Array, numbers(4, 3)] | None = None
     com: Annotated[Array, numbers(3)] = field(default_factory=lambda: np.zeros(3))
     mocap: Mocap = Mocap()
@@ -312,7 +312,7 @@ class Vehicle:
     @property
     def positions(self) -> Array:
         """Rotor positions (4, 3) in m from the geometric centre."""
-        return self.arm_l * _QUADRANT if self.rotor_positions is None else self.rotor_positions
+        return self.arm_l * QUADRANT if self.rotor_positions is None else self.rotor_positions
 
     @property
     def mixing(self) -> Array:

@@ -18,7 +18,7 @@ from ..runtime.page_files import write_text
 from ..runtime.plain_values import plain
 from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
-from .vehicle import _SPIN, Vehicle
+from .vehicle import SPIN, Vehicle
 
 Deviations = Mapping[str, Mapping[str, float]]  # a coefficient's, by effect
 
@@ -126,7 +126,7 @@ def dump_vehicle(vehicle: Vehicle, std: Deviations | None = None) -> str:
             for name, value in effect["coefficients"].items():
                 effect["coefficients"][name] = _rounded(value, 0.0, deviations.get(name, 0.0))
     usual = {f.name: plain(f.default) for f in fields(Vehicle)}
-    usual |= {"com": [0.0] * 3, "spin": plain(_SPIN)}
+    usual |= {"com": [0.0] * 3, "spin": plain(SPIN)}
     stated = {k: x for k, x in data.items() if x is not None and (k not in usual or x != usual[k])}
     lines, effect = [], ""
     for line in yaml.safe_dump(stated, sort_keys=False, allow_unicode=True).splitlines():

@@ -111,9 +111,9 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
     for (place, kind), chance in _CHANGES.items():
         means, spread = _moved(place, kind, shares)
         variance = unchanged[:, None] + spread**2
-        off = np.square(mean[:, None] - means) / variance + np.log(variance)
+        off = (mean[:, None] - means) ** 2 / variance + np.log(variance)
         logs.append(logsumexp(ways[:, None] - 0.5 * off.sum(axis=2), axis=0) + math.log(chance))
-    prior = log_softmax(-0.5 * np.square(_AMOUNTS / _USUAL_AMOUNT))
+    prior = log_softmax(-0.5 * (_AMOUNTS / _USUAL_AMOUNT) ** 2)
     chances = softmax(np.array(logs) + prior)  # each change by each amount
     at, kinds = np.array([*_CHANGES]).T
     places = {place: float(chances[at == place].sum()) for place in at.tolist()}
@@ -131,7 +131,7 @@ def compare(after: Sequence[Trim], before: Sequence[Trim]) -> Change:
         weaker,
         carries_more,
         amount,
-        math.sqrt(np.average(np.square(amounts - amount), weights=weights)),
+        math.sqrt(np.average((amounts - amount) ** 2, weights=weights)),
         dict(zip(FEATURES, np.exp(ways) @ mean, strict=True)),
         dict(zip(FEATURES, np.sqrt(np.exp(ways) @ unchanged), strict=True)),
         before,

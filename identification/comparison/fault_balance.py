@@ -26,10 +26,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ...runtime.arrays import Array, Mask
 from ..logs.table import Pair
+from ..motion.smoothing import TOGETHER
 from .fault_channels import ORDER, STEP, Samples
 
 # signs of the rotors' moments about x, y, z; the last row is the force along z
-SIGNS: Array = np.array([[1.0, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]])
+SIGNS = TOGETHER[[1, 2, 3, 0]] * [[2.0], [-2.0], [2.0], [2.0]]
 BEFORE, AFTER = 25, 4  # least intervals of usual flight before a fault, and after one
 # starts of a loss within an interval: at once (a broken propeller), or as the rotors' speed falls
 # (a motor)
@@ -62,48 +63,48 @@ class FaultBalance:
         count = w.shape[1]
         self.curve = curve
         self.rows = slice(BEFORE, count - AFTER)
-        self.ramps = _ramps(lag)
+        lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], 4)[:, None]
+        elapsed = np.arange(2 + math.ceil(4.0 * lag / STEP)) - STARTS[:, None]
+        since = STEP * np.maximum(elapsed, 0.0)
+        # integral of 1 - exp(-since / lag)
+        self.ramps = np.diff(since + lags * np.expm1(-since / lags)) / STEP
         self.thrust = thrust = samples.thrust(lag, *curve)
         # free columns: a bias, damping and the gyroscopic moment
         free = [[np.ones(count), w[i], w[i - 2] * w[i - 1]] for i in range(3)]
         # a gyro askew by a few degrees shows a part of the strong axes' motion about the weak one
         free[2].extend(turning[:2])
         # each channel's moment, free columns and measurement
-        parts = zip(SIGNS, [*free, []], [*turning, samples.specific_force], strict=True)
-        columns = [np.array([thrust @ signs, *own, y]) for signs, own, y in parts]
+        columns = [
+            np.array([thrust @ signs, *own, y])
+            for signs, own, y in zip(
+                SIGNS, [*free, []], [*turning, samples.specific_force], strict=True
+            )
+        ]
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
-        away += _TURNING * np.square(w).sum(axis=0) + samples.between
+        away += _TURNING * (w**2).sum(axis=0) + samples.between
         # at the start of a fault the error of its shape grows with the acceleration
         strong = maximum_filter1d(np.linalg.norm(turning[:2], axis=0), _AROUND)
         away += strong / max(strong.max(), 1e-300)
         activity = maximum_filter1d(away, 2)  # a rotor late by an interval is wrong there too
-        step: list[Array] = []  # none, and then the likeliest jump beside the noise
         nothing: list[float] = []
+        self.share = np.zeros(count)  # of no jump, and then of the likeliest beside the noise
         for _ in range(3):
-            self.channels = [_BalanceChannel(x, activity, samples.whole, *step) for x in columns]
+            self.channels = [
+                _BalanceChannel(x, activity, samples.whole, self.share) for x in columns
+            ]
             nothing.append(sum(channel.nothing for channel in self.channels))
             k = BEFORE + int(np.argmax(self.steps(self.rows, self.ramps[:1])))
             begin = max(k - 2, BEFORE)
             logs = self.steps(slice(begin, min(k + 3, self.rows.stop)), self.ramps)
             self.log = logs.max()
             ramp, more = np.unravel_index(np.argmax(logs), logs.shape)
-            share = np.concatenate([np.zeros(begin + more), self.ramps[ramp], np.ones(count)])
-            self.share = share[:count]
-            step = [self.share]
+            parts = np.zeros(begin + more), self.ramps[ramp], np.ones(count)
+            self.share = np.concatenate(parts)[:count]
         self.nothing = max(nothing[0], nothing[-1])
 
     def steps(self, rows: slice, ramps: Array) -> Array:
         """Return the log-likelihoods (R, K) of a jump by each ramp, beginning at each of rows."""
         return np.array([sum(c.steps(rows, ramp) for c in self.channels) for ramp in ramps])
-
-
-def _ramps(lag: float) -> Array:
-    """Return the elapsed shares of a loss; see ``FaultBalance``."""
-    lags = np.repeat([_AT_ONCE, max(lag, _AT_ONCE)], 4)[:, None]
-    elapsed = np.arange(2 + math.ceil(4.0 * lag / STEP)) - STARTS[:, None]
-    since = STEP * np.maximum(elapsed, 0.0)
-    # integral of 1 - exp(-since / lag)
-    return np.asarray(np.diff(since + lags * np.expm1(-since / lags)) / STEP)
 
 
 class _BalanceChannel:
@@ -113,13 +114,13 @@ class _BalanceChannel:
         columns: (c, N) these, in this order.
         activity: (N,) relative deviation of the rotors from the mean.
         whole: (N,) the ``ORDER`` samples before are there, without a gap.
-        step: further columns (N,) in the fit of the noise.
+        step: (N,) a further column in the fit of the noise.
     """
 
-    def __init__(self, columns: Array, activity: Array, whole: Mask, *step: Array) -> None:
+    def __init__(self, columns: Array, activity: Array, whole: Mask, step: Array) -> None:
         from scipy.signal import lfilter  # as late as can be: it takes .6 s
 
-        y, x = columns[-1], np.vstack([columns[:-1], *step])
+        y, x = columns[-1], np.vstack([columns[:-1], step])
         moment = np.linalg.lstsq(x.T, y, rcond=None)[0][0]
         x = x[int(moment <= 0.0) :]  # a moment with a negative factor is left out
         residual = y - np.linalg.lstsq(x.T, y, rcond=None)[0] @ x
@@ -136,7 +137,7 @@ class _BalanceChannel:
         # products of an impulse in each row with all directions: the filter runs backwards. A step
         # is a row of impulses. Behind them the sum of squares of a step since ever
         products = self.filtered(directions.T[:, ::-1]) * self.weight[::-1]
-        squares = np.square(self._innovations(np.ones(len(whole))))[::-1]
+        squares = (self._innovations(np.ones(len(whole))) ** 2)[::-1]
         sums = np.vstack([products, squares]).cumsum(axis=1)[:, ::-1]
         self.from_row_on = np.vstack([sums, self.weight, whole])
 
@@ -171,9 +172,9 @@ class _BalanceChannel:
         *known, own = windows[:-3] @ np.diff(begun, prepend=0.0)
         squares, weight, whole = windows[-3:]
         outputs = whole * self.filtered(begun * weight)
-        square = np.square(outputs[:, :-1]).sum(axis=1) + squares[:, -1]
+        square = (outputs[:, :-1] ** 2).sum(axis=1) + squares[:, -1]
         left = square - np.square(known).sum(axis=0)
-        gain = np.square(own) / np.maximum(left, 1e-12 * square + 1e-300)
+        gain = own**2 / np.maximum(left, 1e-12 * square + 1e-300)
         width = 1.0 + np.log(np.maximum(gain / self.variance, 1.0))
         price = 0.5 * np.maximum(width, math.log(self.whole.sum()))
         return np.asarray(_log_likelihood(self.rest - gain, self.weight[self.whole]) - price)
@@ -190,7 +191,7 @@ def _fit_noise(residual: Array, weight: Array, whole: Mask) -> tuple[Any, float,
     gram = windows.T @ windows
     ridge = _RIDGE * gram[0, 0] * np.eye(ORDER)
     poles = np.linalg.solve(gram[1:, 1:] + ridge, gram[1:, 0])
-    rest = np.square(windows @ (whitener := np.append(1.0, -poles))).sum()
+    rest = ((windows @ (whitener := np.append(1.0, -poles))) ** 2).sum()
     return _log_likelihood(rest, weight[whole]), rest / len(windows), whitener, weight
 
 

@@ -19,6 +19,7 @@ from ..logs.flight_phases import usual_thrust
 from ..logs.readers import px4_ulog
 from ..logs.reading import READERS, reader_by_content
 from ..logs.table import Data, Names, median_step
+from ..motion.signals import LONGEST_GAP
 from ..motion.smoothing import lagged
 
 ORDER = 10  # the autoregression's, of the noise
@@ -26,7 +27,7 @@ STEP = 0.02  # s, grid: a rotor takes about as long to follow
 FINE = 0.004  # s, grid of commands for the rotors' lag
 SETTLED = 1.5  # s after the rotors first carry the vehicle, until it is off the ground
 LEAST_SECONDS = 3.0  # in flight: a shorter one does not show the usual motion
-LONGEST_GAP = 0.1  # s without a sample; nothing is interpolated across a longer gap
+
 SHORTEST = ORDER + 1  # unbroken intervals; the noise of a shorter run has no past
 # an axis is clipped if it stays this long within this share of its magnitude, near the end of a
 # usual range of gyros (moved a little by a calibration) or at the largest value of the log
@@ -87,7 +88,7 @@ def samples_of(log: FlightLog, path: Path | None = None) -> Samples:
         if log_map.commands:
             motors = tuple(f"PX4 motor {i}" for i in log_map.commands.order)
     else:
-        command = np.square(log.rotor_speeds) if log.command is None else log.command
+        command = log.rotor_speeds**2 if log.command is None else log.command
         # a held command changes at its own samples alone
         new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
         new[-1] = True

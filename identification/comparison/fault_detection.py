@@ -127,7 +127,7 @@ def _patterns(best: FaultBalance) -> ArrayPair:
     logs = []
     for (size, std), (_, means, spread) in zip(sizes, causes, strict=True):
         variance = std**2 + spread**2
-        off = np.square(size - means) / variance + np.log(variance)
+        off = (size - means) ** 2 / variance + np.log(variance)
         logs.append(-0.5 * off.sum(axis=1, where=says))
     evidence = [logsumexp(log) - math.log(len(log)) for log in logs]
     return np.array(evidence), softmax(logs[:4], axis=1)

@@ -63,8 +63,8 @@ def difference(after: Sequence[Trim], before: Sequence[Trim]) -> tuple[Array, Ar
         r = np.asarray(np.linalg.qr(np.linalg.solve(root, columns), mode="r"))
         a, b = r[..., 0, 0], r[..., 1, 1]
         size = np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=2) + np.log(np.abs(a * b))
-        left = size + 0.5 * np.square(r[..., 2:, 2]).sum(axis=2)
-        log = log - 0.5 * np.square(_SCALES).sum(axis=1) - left.sum(axis=1)
+        left = size + 0.5 * (r[..., 2:, 2] ** 2).sum(axis=2)
+        log = log - 0.5 * (_SCALES**2).sum(axis=1) - left.sum(axis=1)
         ways.append((r[..., 1, 2] / b, b**-2.0, log))
     mean, variance, logs = map(np.concatenate, zip(*ways, strict=True))
     keep = logs > logs.max() + _LEAST_LOG

@@ -23,6 +23,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, flight_phases, flying, usual_thrust
 from ..logs.table import median_step
+from ..motion.smoothing import TOGETHER
 
 LEAST_SECONDS = 3.0  # steady flight: a mean over less follows single manoeuvres
 CALM = 1.5  # m/s: faster, the airflow decides how the rotors share the work
@@ -32,7 +33,6 @@ NEAR = 0.1  # of the median thrust: further off, the vehicle climbs, sinks or pu
 _SMOOTH = 0.25  # s
 BATCH = 1.5  # s: the loop's answer to a gust is over
 FEATURES = ("left_less_right", "front_less_rear", "diagonals", "log_total")
-_MIX = np.array([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, 1.0], [1.0, -1.0, 1.0, -1.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +62,8 @@ def features_of(thrust: Array) -> Array:
     These are differences in parts of the total, and log(total). The differences are left less
     right, front less rear, and rotors 1 and 3 less 2 and 4.
     """
-    total = thrust.sum(axis=-1, keepdims=True)
-    return np.concatenate([thrust @ _MIX.T / total, np.log(total)], axis=-1)
+    total, differences = np.split(thrust @ (2.0 * TOGETHER), [1], axis=-1)
+    return np.concatenate([differences / total, np.log(total)], axis=-1)
 
 
 def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
@@ -75,7 +75,7 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     """
     name = log.source or log.name
     if log.has_rotor_speeds or log.command is None:
-        thrust = np.square(log.rotor_speeds) * vehicle.k
+        thrust = log.rotor_speeds**2 * vehicle.k
     elif vehicle.motor_curve is None:
         thrust = log.command
     else:
@@ -99,8 +99,8 @@ def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
     # the last batch may be a short one
     means = [thrust[rows].mean(axis=0) for rows in batches if step[rows].sum() >= 0.5 * BATCH]
     std = np.std(features_of(np.array(means)), axis=0, ddof=1) / math.sqrt(len(means))
-    known = None if log.voltage is None else log.voltage[steady & (log.voltage > 0.0)]
-    voltage = math.nan if known is None or not known.size else known.mean()
+    known = np.zeros(0) if log.voltage is None else log.voltage[steady & (log.voltage > 0.0)]
+    voltage = known.mean() if known.size else math.nan
     return Trim(name, seconds, mean / mean.sum(), mean.sum(), std, voltage)
 
 

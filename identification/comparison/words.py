@@ -8,61 +8,27 @@ from typing import Any
 import numpy as np
 
 from ...runtime.drawing import AFTER, BEFORE, BLACK, GREY, new_figure, room_above, styled
-from ...runtime.page_files import write_json, write_png
+from ...runtime.page_files import page_template, write_json, write_png
 from ...runtime.plain_values import plain
-from ..logs.table import Data, Values
+from ..logs.table import Data
 from ..logs.what_flew import PLACES
-from .change import NOWHERE, SOMETHING_ELSE, SURE, Change
-from .fault_detection import ALL, NOTHING, OTHER, ROTORS, RotorFault
-
-# sentences with a place for the probability
-_NO_ROTOR = {
-    NOTHING: "No rotor lost thrust {}.",
-    OTHER: "No rotor fault explains what happened: a force or torque began that no rotor makes, "
-    "a gust, a load or a collision {}.",
-    ALL: "All rotors lost thrust at once {}: the battery, the air, or the vehicle.",
-}
-_NAMED = 0.05  # least probability of a rival in the sentence
+from .change import SURE, Change
+from .fault_detection import ROTORS, RotorFault
 
 
-def _undecided(chances: Values) -> str:
-    """Return a sentence on an unsure finding and its rivals."""
-    order = sorted(chances.items(), key=itemgetter(1), reverse=True)
-    named = ", ".join(f"{name} {chance:.2f}" for name, chance in order if chance >= _NAMED)
-    return f"Undecided, by probability: {named}."
+def _headline(**given: Any) -> str:
+    """Return the sentence on a finding with some ``chances``."""
+    return page_template(__package__, "templates/headline.j2", html=False).render(**given)
 
 
 def change_headline(change: Change) -> str:
     """Return a sentence on the change, with its probability."""
-    place, chance = change.place, f"{change.probabilities[change.place]:.2f}"
-    size = f"{100 * change.amount:.0f} ± {100 * change.amount_std:.0f} %"
-    if place == NOWHERE:
-        unchanged = f"Nothing changed (probability {chance})."
-        return unchanged if change.sure else _undecided(change.probabilities)
-    if place == SOMETHING_ELSE:
-        kind = "the rotors share the work otherwise than one weaker rotor or one weight would ask."
-    elif place == "all rotors":
-        kind = (
-            f"all rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
-        )
-    elif change.weaker >= SURE:
-        kind = f"that rotor delivers {size} less for what it is asked."
-    elif change.carries_more >= SURE:
-        kind = f"the vehicle carries {size} of its weight more there."
-    else:
-        kind = (
-            f"the rotor delivers {size} less (probability {change.weaker:.2f}), or the vehicle "
-            f"carries as much more there ({change.carries_more:.2f}): these look alike."
-        )
-    if not change.sure:
-        return f"{_undecided(change.probabilities)} If the first: {kind}"
-    return f"Changed: {place}, probability {chance}; {kind}"
+    return _headline(chances=change.probabilities, change=change, sure=SURE)
 
 
 def change_data(change: Change) -> Data:
     """Return the finding as plain data."""
-    data: Data = plain({"headline": change_headline(change), **change._asdict()})
-    return data
+    return dict(plain({"headline": change_headline(change), **change._asdict()}))
 
 
 def write_change(change: Change, folder: Path) -> tuple[Path, Path]:
@@ -119,26 +85,15 @@ def _in_words(fault: RotorFault, cause: str) -> str:
 
 def fault_headline(fault: RotorFault) -> str:
     """Return a sentence on the rotor fault, its time and size, with its probability."""
-    if not fault.sure:
-        return _undecided({_in_words(fault, x): p for x, p in fault.probabilities.items()})
-    chance = fault.probabilities[fault.found]
-    sure = f"(probability {f'{chance:.2f}' if chance < 0.9995 else 'above 0.999'})"
-    if fault.rotor is None:
-        return _NO_ROTOR[fault.found].format(sure)
-    rotor = _in_words(fault, fault.found).removeprefix("a fault of r")
-    low, high = fault.onset_ci95_s
-    lost, most, least = (100 - 100 * x for x in (fault.remaining, *fault.remaining_ci95))
-    return (
-        f"R{rotor} lost {lost:.0f} % of its thrust ({least:.0f} to {most:.0f}) at t = "
-        f"{fault.onset_s:.3f} s ({low:.3f} to {high:.3f}, the log's clock) {sure}."
-    )
+    chances = {_in_words(fault, cause): p for cause, p in fault.probabilities.items()}
+    return _headline(chances=chances, fault=fault, cause=_in_words(fault, fault.found))
 
 
 def fault_data(fault: RotorFault) -> Data:
     """Return the finding as plain data."""
-    data: Data = plain({"headline": fault_headline(fault), **fault._asdict(), "samples": None})
+    data = {"headline": fault_headline(fault), **fault._asdict()}
     del data["samples"]
-    return data
+    return dict(plain(data))
 
 
 def write_faults(faults: Sequence[RotorFault], folder: Path) -> tuple[Path, Path]:

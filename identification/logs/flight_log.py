@@ -56,7 +56,6 @@ ACCELEROMETER = ("ax", "ay", "az")
 GYRO = ("gx", "gy", "gz")
 IMU = (*ACCELEROMETER, *GYRO)
 COMMANDS = ("cmd1", "cmd2", "cmd3", "cmd4")
-REQUIRED = ("t", *POSE, *ROTORS)
 
 VEHICLE = re.compile(r"vehicle=([A-Za-z0-9][A-Za-z0-9_.+ -]{0,63})")  # a column's name
 

@@ -19,7 +19,6 @@ from .flight_log import (
     COMMANDS,
     IMU,
     POSE,
-    REQUIRED,
     ROTORS,
     FlightLog,
     SomeVehicle,
@@ -100,8 +99,7 @@ def read_log(
     """
     path = Path(path) if isinstance(path, str) else path
     with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for themselves
-        log = _read(path, reader, vehicle, map, piece)
-    return finished(log, vehicle)
+        return finished(_read(path, reader, vehicle, map, piece), vehicle)
 
 
 def finished(log: FlightLog, vehicle: SomeVehicle) -> FlightLog:
@@ -171,10 +169,11 @@ def _read(
         said = "columns: by a map that was guessed without a doubt; windwrench check shows it"
         return replace(log, notes=(said, *log.notes))
     known = ", ".join(f"{r.name} ({r.signature[0]} ...)" for r in _table_readers())
-    needed = ("t", *ROTORS) if header.issuperset(IMU) else REQUIRED
+    motion = () if header.issuperset(IMU) else POSE
+    needed = ("t", *motion, *(COMMANDS if header.issuperset(COMMANDS) else ROTORS))
     missing = [name for name in needed if name not in header]
     raise InputError(
-        f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, or the "
+        f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(needed)}, or the "
         f"columns of {known}, found {', '.join(table.header[:20])}. A table of "
         f"other columns is read with a map: windwrench check {path.name} --write-map map.yaml "
         "proposes one"

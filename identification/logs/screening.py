@@ -27,7 +27,7 @@ from .flight_log import FORCE_HZ, TORQUE_HZ, FlightLog, NotedLog, SomeVehicle, s
 from .flight_phases import carrying, flying, usual_thrust
 from .inertial import LEAST_SAMPLES, gravity_doubt, is_stuck
 from .magnitudes import DOUBTFUL, interpolated, motor_doubts, rotor_doubt, time_doubt, within
-from .table import Array, Mask, lengths, median_step
+from .table import Array, Lines, Mask, lengths, median_step
 
 LEAST_SECONDS = 10.0  # s, unbroken pose in flight
 _LEAST_RATE_HZ = 50.0
@@ -105,37 +105,41 @@ def screen_log(
         hear(_new_poses(log, same))
         log = replace(log, valid=log.valid & ~same)
     hear(stuck_channels(log, vehicle))
-    doubt = convention_doubt(log, vehicle)
-    hear([doubt] if isinstance(doubt, _Refused) else [])
+    delay = check_conventions(log, vehicle)
     if not by_imu:
         hear(_steps(log))
         if least_seconds is not None:
             hear(_length(log, vehicle, least_seconds))
-    hear(filter(None, [doubt]))
+    hear(map(_Fault, delay))
     return log, tuple(notes)
 
 
-def convention_doubt(log: FlightLog, vehicle: SomeVehicle) -> str:
-    """Return the contradiction between a log's motion and its rotors, with the advice that leaves a
-    consistent log; empty: none, or nothing to tell from. An estimate is refused for all but a
-    delay.
+def check_conventions(log: FlightLog, vehicle: SomeVehicle) -> Lines:
+    """Return a delay of a log's rotors against its motion, in words; none: no such delay, or
+    nothing to tell from.
 
     Args:
         log: the flight.
         vehicle: as declared; None: four rotors, front-left, rear-left, rear-right, front-right.
+
+    Raises:
+        InputError: the pose stands still, or the motion contradicts the rotors in another way; with
+            the advice that leaves a consistent log.
     """
-    by_imu = reads_imu(log)
+    by_imu, source = reads_imu(log), log.source or log.name or "log"
+    for text in _held(log) if vehicle is None else ():  # else checked with the poses
+        raise InputError(f"{source}: {text}")
     if not log.has_rotor_speeds or not (by_imu or pose_pieces(log)):
-        return ""
+        return []
     advice, mends = remedies(log if by_imu else _without_leaps(log), vehicle, by_imu)
     says = "; or ".join(dict.fromkeys(reading.says for reading in advice))
     if all(reading.late and not replace(reading, late=0.0).says for reading in advice):
-        return _Fault(says)
+        return [says] if says else []
     whose = "motion contradicts the rotor speeds and gravity"
     if by_imu:
         whose = "gyro contradicts the rotors' torques"
     unmended = "" if mends else ". No usual convention mends this log; the likeliest is named"
-    return _Refused(f"{says}. As logged, the {whose}{unmended}")
+    raise InputError(f"{source}: {says}. As logged, the {whose}{unmended}")
 
 
 def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
@@ -166,7 +170,8 @@ def _rotors(log: FlightLog, vehicle: Vehicle, by_imu: bool) -> _Findings:
     # less of the weight is no turning rotor, in whatever unit
     if most < 0.003:
         yield _Refused(
-            f"omega1..omega4 are at rest all the time, so nothing flew; expected {hover}"
+            "omega1..omega4 are at rest all the time, or too slow for the "
+            f"{vehicle.mass:g} kg of {vehicle.name}, so nothing flew; expected {hover}"
         )
     if not np.isfinite(most):
         yield _Refused(f"omega1..omega4 are beyond all rotors; expected {hover}")
@@ -246,11 +251,20 @@ def _imu(log: FlightLog, vehicle: Vehicle, least: float) -> _Findings:
         yield _Refused(f"ax, ay, az {doubt}")
 
 
+def _held(log: FlightLog) -> _Findings:
+    """Check for a position and an attitude that change."""
+    kinds = _Refused("position (px, py, pz)"), _Fault("attitude (qw to qz)")
+    for name, x in zip(kinds, (log.position, log.quaternion), strict=True):
+        if np.ptp(log.t) > 1.0 and is_stuck(x[log.valid]):
+            yield type(name)(
+                f"the {name} never changes, to the last digit; expected the poses of a flight"
+            )
+
+
 def _new_poses(log: FlightLog, same: Mask) -> _Findings:
     """Check the rate of new poses; ``same`` (N,): the pose is the one before, to the last digit."""
     seen = np.flatnonzero(log.valid)
-    if np.ptp(log.t[seen]) > 1.0 and same[seen[1:]].all():
-        yield _Refused("the pose never changes, to the last digit; expected the poses of a flight")
+    yield from _held(log)
     fastest = (log.rotor_speeds**2).max(axis=1)
     # 0.2 s: four of the slowest period
     if held := _stretches((same & carrying(fastest))[seen], log.t[seen], 0.2):

@@ -11,16 +11,18 @@ import numpy as np
 
 from ..logs.flight_log import FlightLog, with_rows
 from ..logs.table import Array, Data, Rows, median_step
+from .inertial_signals import reads_imu
 
 
 def on_pose_clock(log: FlightLog) -> FlightLog:
-    """Return a log with one row a pose, or the log itself where poses stand in every row.
+    """Return a log with one row a pose, or the log itself where poses stand in every row, or are so
+    rare that an IMU shows the motion.
 
     Rotor speeds are the root of the mean square, commands, voltage and true wrench the mean over
     the interval that ends at the pose. Gyro and accelerometer are means around the pose.
     """
     rows = np.flatnonzero(log.valid)
-    if len(rows) < 2 or median_step(log.t[rows]) < 1.5 * log.period:
+    if reads_imu(log) or len(rows) < 2 or median_step(log.t[rows]) < 1.5 * log.period:
         return log
     begins = np.append(rows[0], rows[:-1] + 1)
     middles = np.append(0, (rows[1:] + rows[:-1]) // 2 + 1)

@@ -202,7 +202,7 @@ def continuous(quaternion: Array) -> Array:
 
 
 # thrust and torques of four rotors, each of length 1
-_TOGETHER = 0.5 * np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, -1, 1], [1, -1, 1, -1]])
+TOGETHER = 0.5 * np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, -1, 1], [1, -1, 1, -1]])
 _WELCH = 256  # samples of a spectrum, and held beyond either end
 
 
@@ -212,7 +212,7 @@ def likeliest_speeds(speeds: Array, period: float) -> Array:
     Wiener's filter of the sums and differences of their squares, which make thrust and torques. The
     noise is white, as high as the highest quarter of the spectrum: no rotor follows there.
     """
-    squares = np.square(speeds) @ _TOGETHER
+    squares = np.square(speeds) @ TOGETHER
     frequency, power = power_spectrum(squares, period, _WELCH)
     noise = power[-len(power) // 4 :].mean(axis=0)
     share = np.maximum(1.0 - noise / np.maximum(power, np.finfo(float).tiny), 0.0)
@@ -221,4 +221,4 @@ def likeliest_speeds(speeds: Array, period: float) -> Array:
     every = np.fft.rfftfreq(len(longer), period)
     gains = np.column_stack([np.interp(every, frequency, x) for x in share.T])
     smooth = np.fft.irfft(gains * np.fft.rfft(longer, axis=0), len(longer), axis=0)
-    return np.sqrt(np.maximum(smooth[_WELCH:-_WELCH] @ _TOGETHER, 0.0))
+    return np.sqrt(np.maximum(smooth[_WELCH:-_WELCH] @ TOGETHER, 0.0))

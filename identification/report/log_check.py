@@ -17,7 +17,7 @@ from ..logs.map_guess import Guess, guess_map
 from ..logs.map_text import map_yaml
 from ..logs.mapped_log import map_table
 from ..logs.reading import finished, opened, read_log, reader_by_columns
-from ..logs.screening import LEAST_SECONDS, convention_doubt, screen_log
+from ..logs.screening import LEAST_SECONDS, check_conventions, screen_log
 from ..logs.table import Data, Names, Table
 from ..motion.noise_spectrum import noise_spectra
 from .log_channels import Channel, log_channels
@@ -154,14 +154,14 @@ def _doubts(log: FlightLog, doubts: list[str], vehicle: Vehicle | None) -> Names
     diagnosis, warnings.
     """
     told = warnings_in(log.notes)
-    if vehicle is None:
-        told += filter(None, [convention_doubt(log, None)])
-    else:
-        least = DIAGNOSIS.least_seconds_each if log.commanded else LEAST_SECONDS
-        try:
+    least = DIAGNOSIS.least_seconds_each if log.commanded else LEAST_SECONDS
+    try:
+        if vehicle is None:
+            told += check_conventions(log, None)
+        else:
             told += map(without_warning, screen_log(log, vehicle, least)[1])
-        except InputError as error:
-            refusal = str(error).removeprefix(f"{log.source}: ")
-            doubts.append(f"diagnose refuses this log: {refusal}")
-            told = [text for text in told if text != refusal]
+    except InputError as error:
+        refusal = str(error).removeprefix(f"{log.source}: ")
+        doubts.append(f"diagnose refuses this log: {refusal}")
+        told = [text for text in told if text != refusal]
     return tuple(dict.fromkeys([*doubts, *told]))

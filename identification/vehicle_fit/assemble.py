@@ -1,4 +1,4 @@
-"""The vehicle made of estimates, and the flights to add for missing ones."""
+"""The vehicle made of estimates."""
 
 import math
 from dataclasses import replace
@@ -6,26 +6,29 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.effects import Role, get
-from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Uncertainty, Vehicle
+from ...dynamics.vehicle import (
+    QUADRANT,
+    EffectSetting,
+    Mocap,
+    MotorCurve,
+    Uncertainty,
+    Vehicle,
+)
 from ..logs.flight_log import Logs
-from ..logs.table import NamedNumbers, Values, median_step
+from ..logs.table import median_step
 from ..motion.sensor_noise import sensor_noise
-from .effect_settings import effect_of
+from .effect_settings import LAG, effect_of
 from .geometry import (
     COMMAND_SPREAD,
     HOVER_SPEED,
-    QUADRANT,
     ROTOR_RADIUS,
     THRUST_SPREAD,
 )
 from .model import inertia_of
 from .motors import MotorResponse
-from .parameters import FURTHER, QUANTITIES
-from .result import ASSUMED, IDENTIFIED, NOTHING, Estimated
+from .parameters import FURTHER
+from .result import IDENTIFIED, NOTHING, Estimated
 from .solve import VehicleFit
-
-# roles of the library's effects within a fit's reach
-ROLES = dict.fromkeys(further.role for further in FURTHER.values() if further.role)
 
 
 def vehicle_of(
@@ -47,26 +50,26 @@ def vehicle_of(
         if e.status == IDENTIFIED and not e.low < 0.0 < e.high
     }
     if model.commands:
-        thrust = np.zeros(max(model.exponents) + 1)
-        thrust[[*model.exponents]] = [fit.values[f"a{j}"] for j in range(len(model.exponents))]
+        thrust = tuple(fit.values.get(f"a{e}", 0.0) for e in range(3))
         voltage = estimates["voltage_exponent"]
-        exponent = voltage.value if voltage.status == IDENTIFIED else 0.0
-        curve = MotorCurve(tuple(thrust.tolist()), exponent)
+        curve = MotorCurve(thrust, voltage.value if voltage.status == IDENTIFIED else 0.0)
         k = model.weight / (4.0 * HOVER_SPEED**2)
     else:
         k = estimates["k"].value
         if motors is not None:  # thrust against command by way of the speed
             curve = MotorCurve(tuple(k * np.polynomial.polynomial.polypow(motors.speed, 2)))
-    late, of_lag = "lag" in model.free, effect_of(Role.LAG)
-    coefficients = {role: _coefficients(role, shown) for role in ROLES}
-    if coefficients[Role.ROTOR_DRAG]:  # a drag at the rotors damps by itself
-        coefficients[Role.RATE_DAMPING] = {}
+    late = "lag" in model.free
+    effects = {}
+    for effect in [effect_of(further.role) for further in FURTHER.values() if further.role]:
+        values = {c: shown.get(f"{effect} {c.name}", 0.0) for c in get(effect).coefficients}
+        # without impossible signs
+        effects[effect] = {c.name: x for c, x in values.items() if x > 0.0 or x < 0.0 > c.minimum}
+    if effects[effect_of(Role.ROTOR_DRAG)]:  # a drag at the rotors damps by itself
+        del effects[effect_of(Role.RATE_DAMPING)]
     if late:
-        lag = get(of_lag).coefficients[0].name
-        coefficients[Role.LAG] = {lag: estimates[of_lag].value}
-    effects = [EffectSetting(effect_of(r), c) for r, c in coefficients.items() if c]
+        effects[LAG] = {get(LAG).coefficients[0].name: estimates[LAG].value}
     if (behind := shown.get("time_offset", 0.0)) > 0.0:
-        effects.append(EffectSetting("latency", {"d": behind}))
+        effects["latency"] = {"d": behind}
     inertia = {f"J{a}": estimates[f"J{a}{a}"].value for a in "xyz"}
     even = np.allclose(geometry.positions, geometry.arm * QUADRANT)
     vehicle = Vehicle(
@@ -83,28 +86,21 @@ def vehicle_of(
         spin=model.spin.copy(),
         rotor_positions=None if even else geometry.positions,
         com=np.array([shown.get(f"com {a}", 0.0) for a in "xyz"]),
-        effects=tuple(effects),
+        effects=tuple(EffectSetting(*e) for e in effects.items() if e[1]),
         motor_curve=curve,
         uncertainty=_uncertainty(estimates, arm, curve is not None),
     )
-    posed = next((log for log in logs if log.has_pose), None)
-    if posed is None:
-        return vehicle
-    noise, rate = sensor_noise(posed, vehicle), 1.0 / median_step(posed.t[posed.valid])
-    mocap = Mocap(rate, max(noise.position, 1e-5), max(noise.attitude, 1e-4))
-    return replace(vehicle, mocap=mocap)
-
-
-def _coefficients(role: str, shown: Values) -> NamedNumbers:
-    """Return the coefficients of a role's effect, without impossible signs."""
-    effect = effect_of(role)
-    values = {c: shown.get(f"{effect} {c.name}", 0.0) for c in get(effect).coefficients}
-    return {c.name: x for c, x in values.items() if x > 0.0 or (x < 0.0 and c.minimum < 0.0)}
+    for log in logs:
+        if log.has_pose:
+            noise, rate = sensor_noise(log, vehicle), 1.0 / median_step(log.t[log.valid])
+            mocap = Mocap(rate, max(noise.position, 1e-5), max(noise.attitude, 1e-4))
+            return replace(vehicle, mocap=mocap)
+    return vehicle
 
 
 def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertainty:
-    """Return the standard deviations of the 95 % intervals, thrust's with the spread from day to
-    day. The deviation of the given mass is not known.
+    """Return the standard deviations of the 95 % intervals. The deviation of the given mass is not
+    known.
     """
 
     def share(*names: str) -> list[float]:
@@ -113,26 +109,13 @@ def _uncertainty(estimates: Estimated, arm: float, commands: bool) -> Uncertaint
 
     centre = [e for n in ("com x", "com y") if (e := estimates[n]).status != NOTHING]
     return Uncertainty(
-        thrust=math.hypot(
-            min(share("k", "thrust(0.25)", "thrust(0.5)", "thrust(0.75)"), default=0.0),
-            THRUST_SPREAD,
-        ),
+        thrust=min(share("k"), default=THRUST_SPREAD),
         rotor=max((min((e.high - e.low) / 1.96 / arm, 0.99) for e in centre), default=0.0),
         torque=max(share("p/k"), default=0.0),
         inertia=max(share("Jxx", "Jyy", "Jzz"), default=0.0),
         arm_l=max(share("arm_l"), default=0.0),
-        command=COMMAND_SPREAD if commands else 0.0,
+        command=min(
+            share("thrust(0.25)", "thrust(0.5)", "thrust(0.75)"),
+            default=COMMAND_SPREAD if commands else 0.0,
+        ),
     )
-
-
-def advice_of(estimates: Estimated) -> list[str]:
-    """Return the flights or arguments to add for quantities missing from the logs."""
-    known = estimates | {"lag": estimates[effect_of(Role.LAG)]}
-    if estimates["arm_l"].status == ASSUMED:  # and inertia with it
-        known = {name: e for name, e in known.items() if name not in ("Jxx", "Jyy", "Jzz")}
-    texts = [
-        QUANTITIES["unmeasured"].get(name, text) if math.isnan(known[name].value) else text
-        for name, text in QUANTITIES["advice"].items()
-        if name in known and known[name].status in (ASSUMED, NOTHING)
-    ]
-    return list(dict.fromkeys(texts))

@@ -8,16 +8,25 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from ...runtime.arrays import Array, Mask
 from ...runtime.errors import InputError
 from ..logs.flight_log import TORQUE_HZ, FlightLog, Logs, serves
 from ..logs.flight_phases import carried
-from ..logs.table import Data, Pair, median_step
-from ..motion.signals import Signals, in_body, log_signals, pose_pieces, voltage_at
+from ..logs.table import Pair, median_step
+from ..motion.signals import (
+    LONGEST_GAP,
+    SHORTEST_PIECE,
+    Signals,
+    in_body,
+    log_signals,
+    pose_pieces,
+    voltage_at,
+)
 from ..motion.smoothing import (
     derivative,
     low_pass,
@@ -28,11 +37,13 @@ from ..motion.smoothing import (
 )
 from .geometry import GRAVITY
 
-_SHORTEST_PIECE = 3.0  # s; shorter ones have no frequency low enough to tell a bias
-_GAP = 0.1  # s without a sample: a piece ends
 # Hz, low-pass of angular velocity and velocity as factors of products: it passes a quadrotor's
 # motion and keeps out noise, which a product squares
 _PRODUCT_HZ = 8.0
+# Hz: above, velocity is the accelerometer's integral. The pose's noise grows with frequency, and
+# drag of a noisy velocity is too small: 1.0e-6 N/(rad/s m/s) on a small quadrotor, 2.7e-6 by the
+# coherence of 0.99 below
+_POSED_HZ = 1.0
 # Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
 _FASTEST_HZ = 200.0
 # share of different values among all: rotor speeds below it are rounded
@@ -49,34 +60,19 @@ class MotionPiece(NamedTuple):
     angular_acceleration: Array  # (n, 3) rad/s2
     angular_velocity: Array  # (n, 3) rad/s, smoothed
     velocity: Array | None = None  # (n, 3) m/s, body axes, smoothed
-    rotor_speeds: Array | None = None  # (n, 4) rad/s
+    # (n, 4) speeds in rad/s, or commands where no speeds are compared
+    rotors: Array = np.empty((0, 4))
     command: Array | None = None  # (n, 4), 0 to 1
     voltage: Array | None = None  # (n,) V
-
-    def set_back(self, late: int) -> "MotionPiece":
-        """Return the piece with its rotors ``late`` samples later; the first or last sample holds
-        at the end.
-        """
-        rows = np.clip(np.arange(len(self.t)) - late, 0, len(self.t) - 1)
-        of_rotors = {n: getattr(self, n) for n in ("rotor_speeds", "command", "voltage")}
-        return self._replace(**{n: x[rows] for n, x in of_rotors.items() if x is not None})
 
     def measured(self) -> Array:
         """Return specific force and angular acceleration (n, 6)."""
         return np.column_stack([self.specific_force, self.angular_acceleration])
 
-    @property
-    def rotors(self) -> Array:
-        """Rotor speeds in rad/s, or commands where no speeds are compared (n, 4)."""
-        rotors = self.command if self.rotor_speeds is None else self.rotor_speeds
-        assert rotors is not None
-        return rotors
-
-    def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
-        """Return the piece with each of its series changed."""
-        every = self._asdict().items()
-        series: Data = {n: change(x) for n, x in every if isinstance(x, np.ndarray)}
-        return self._replace(**series)
+    def mapped(self, change: Callable[[Array], Any], *names: str) -> "MotionPiece":
+        """Return the piece with each of its series changed, or these alone."""
+        some = {name: getattr(self, name) for name in names or self._fields}
+        return self._replace(**{n: change(x) for n, x in some.items() if np.ndim(x)})
 
 
 Pieces = list[MotionPiece]
@@ -144,12 +140,8 @@ def speed_noise(pieces: Pieces) -> float:
     """Return the standard deviation (rad/s) of the white noise of rotor speeds with their rounding,
     from the highest quarter of their spectrum: no rotor follows its command there.
     """
-    powers = []
-    for piece in pieces:
-        if piece.rotor_speeds is not None:
-            _, power = power_spectrum(piece.rotor_speeds, piece.period, 256)
-            powers.append(power[-len(power) // 4 :].mean(axis=0) / (2.0 * piece.period))
-    return math.sqrt(float(np.median(powers))) if powers else 0.0
+    powers = [power_spectrum(p.rotors, p.period, 256)[1] / (2.0 * p.period) for p in pieces]
+    return math.sqrt(np.median([power[-len(power) // 4 :].mean(axis=0) for power in powers]))
 
 
 def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
@@ -176,7 +168,7 @@ def pieces_of(logs: Logs, windows: Sequence[Pair]) -> tuple[Pieces, Sources]:
     pieces, sources = moving or pieces, replace(sources, velocity=bool(moving))
     if not pieces:
         raise InputError(
-            f"{logs[0].name}: no piece of {_SHORTEST_PIECE:g} s in flight is unbroken "
+            f"{logs[0].name}: no piece of {SHORTEST_PIECE:g} s in flight is unbroken "
             "in pose and sensors; expected a longer flight, or another --from and --to"
         )
     return pieces, sources
@@ -188,7 +180,7 @@ def _without_bias(log: FlightLog) -> FlightLog:
     """
     if log.accelerometer is None or not pose_pieces(log):
         return log
-    off = [_sensor(log, log.accelerometer, s.t) - _felt(s) for s in log_signals(log)]
+    off = [_sensor(log, "accelerometer", s.t) - _felt(s) for s in log_signals(log)]
     return replace(log, accelerometer=log.accelerometer - np.vstack(off).mean(axis=0))
 
 
@@ -197,15 +189,27 @@ def _felt(s: Signals) -> Array:
     return in_body(s.acceleration + np.array([0.0, 0.0, GRAVITY]), s.rotation)
 
 
+def _moving(log: FlightLog, s: Signals) -> Array:
+    """Return the velocity (n, 3) of a pose's motion, body axes: quick changes by the accelerometer,
+    if any.
+    """
+    velocity = s.velocity
+    if log.accelerometer is not None:
+        felt = np.einsum("nij,nj->ni", s.rotation, _sensor(log, "accelerometer", s.t))
+        gained = cumulative_trapezoid(felt - [0.0, 0.0, GRAVITY], dx=s.period, axis=0, initial=0.0)
+        velocity = gained + low_pass(velocity - gained, _POSED_HZ, s.period)
+    return in_body(velocity, s.rotation)
+
+
 def _posed(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionPiece]:
     """Yield motion by the pose's derivatives, with accelerometer and gyro in their place if any."""
     for s in log_signals(log, wide_hz=np.inf) if pose_pieces(log) else ():
-        force, velocity = _felt(s), in_body(s.velocity, s.rotation)
+        force, velocity = _felt(s), _moving(log, s)
         rate, turning = s.angular_velocity, s.angular_acceleration
-        if sources.force == "accelerometer" and log.accelerometer is not None:
-            force = _sensor(log, log.accelerometer, s.t)
-        if sources.rate == "gyro" and log.gyro is not None:
-            rate = _sensor(log, log.gyro, s.t)
+        if sources.force == "accelerometer":
+            force = _sensor(log, sources.force, s.t)
+        if sources.rate == "gyro":
+            rate = _sensor(log, sources.rate, s.t)
             turning = derivative(rate, s.period)
         yield MotionPiece(number, s.t, s.period, force, turning, rate, velocity)
 
@@ -215,29 +219,25 @@ def _inertial(log: FlightLog, number: int, sources: Sources) -> Iterator[MotionP
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
     period = median_step(log.t[read])
-    for rows in unbroken(log.t, read, max(_GAP, 3.5 * period), 15, _SHORTEST_PIECE):
+    for rows in unbroken(log.t, read, max(LONGEST_GAP, 3.5 * period), 15, SHORTEST_PIECE):
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
-        rate = _sensor(log, log.gyro, t)
-        none, felt = np.full_like(rate, np.nan), log.accelerometer
-        force = none if felt is None else _sensor(log, felt, t)
-        piece = MotionPiece(number, t, period, force, derivative(rate, period), rate)
-        moving = []
-        if sources.velocity:
-            velocity = np.full((len(t), 3), np.nan)  # in gaps of the pose
-            for s in log_signals(log) if pose_pieces(log) else ():
-                inside = (t >= s.t[0]) & (t <= s.t[-1])
-                velocity[inside] = resampled(t[inside], s.t, in_body(s.velocity, s.rotation))
-            moving = _cut(piece._replace(velocity=velocity), np.isfinite(velocity[:, 0]))
+        rate = _sensor(log, "gyro", t)
+        force = np.full_like(rate, np.nan)
+        if log.accelerometer is not None:
+            force = _sensor(log, "accelerometer", t)
+        piece, moving = MotionPiece(number, t, period, force, derivative(rate, period), rate), []
+        for s in log_signals(log) if sources.velocity and pose_pieces(log) else ():
+            velocity = resampled(t, s.t, _moving(log, s))
+            moving += _cut(piece._replace(velocity=velocity), (t >= s.t[0]) & (t <= s.t[-1]))
         yield from moving or [piece]
 
 
 def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
     """Return a piece with the rotors beside its motion; fast logs are thinned out."""
     t, period = piece.t, piece.period
+    rotors = getattr(log, "command" if sources.rotors == "commands" else "rotor_speeds")
     piece = piece._replace(
-        rotor_speeds=(
-            resampled(t, log.t, log.rotor_speeds) if sources.rotors == "rotor speeds" else None
-        ),
+        rotors=resampled(t, log.t, rotors),
         command=None if log.command is None else resampled(t, log.t, log.command),
         voltage=voltage_at(log, t),
     )
@@ -251,13 +251,14 @@ def _piece(log: FlightLog, piece: MotionPiece, sources: Sources) -> MotionPiece:
 
         piece = piece.mapped(thinned)._replace(t=thin, period=period)
 
-    rate, velocity = low_pass(piece.angular_velocity, _PRODUCT_HZ, period), piece.velocity
-    if velocity is not None:
-        velocity = low_pass(velocity, _PRODUCT_HZ, period)
-    return piece._replace(angular_velocity=rate, velocity=velocity)
+    def smooth(x: Array) -> Array:
+        return low_pass(x, _PRODUCT_HZ, period)
+
+    return piece.mapped(smooth, "angular_velocity", "velocity")
 
 
-def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
+def _sensor(log: FlightLog, channel: str, t: Array) -> Array:
+    values = getattr(log, channel)
     read = np.isfinite(values[:, 0])
     return resampled(t, log.t[read], values[read])
 
@@ -267,5 +268,5 @@ def _cut(piece: MotionPiece, keep: Mask) -> Pieces:
     return [
         piece.mapped(itemgetter(slice(a, b)))
         for a, b in runs_of(keep)
-        if (b - a) * piece.period >= _SHORTEST_PIECE
+        if (b - a) * piece.period >= SHORTEST_PIECE
     ]

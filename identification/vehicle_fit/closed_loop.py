@@ -17,27 +17,12 @@ from scipy.optimize import lsq_linear
 from ...dynamics.vehicle import LoopReaction, Vehicle
 from ...runtime.arrays import Array
 from ..prediction import LoggedStarts, offsets
+from .parameters import QUANTITIES
 
-UNITS = {  # in the order of the coefficients
-    "roll_gain": "1",
-    "pitch_gain": "1",
-    "yaw_gain": "1",
-    "unmeasured": "rad/s2",
-    "damping": "1/s",
-    "stiffness": "1/s2",
-    "flapping": "rad/s2/(m/s)",
-    "never_answered": "rad/s2/(m/s)",
-    "yaw_damping": "1/s",
-}
-_LOWEST = np.array([-np.inf if unit.endswith("(m/s)") else 0.0 for unit in UNITS.values()])
+_LOOP = QUANTITIES["loop"]  # in the order of the coefficients
+UNITS = {name: unit for name, (unit, *_) in _LOOP.items()}
+_USUAL, _DAMPED, _SIZES, _LOWEST = np.transpose([numbers for _, *numbers in _LOOP.values()])
 _DAMPING = np.array(["damping" in name for name in UNITS])
-# a loop that damps within .2 s; the unmeasured moments' start is the model's own turning
-_BEGIN = LoopReaction(0.5, 0.5, 0.5, 0.0, 4.0, 10.0, 0.0, 0.0, 4.0)
-# the body's rate decays, whatever the rotors do
-_DAMPED = LoopReaction(0.0, 0.0, 0.0, 1e6, 4.0, 0.0, 0.0, 0.0, 4.0)
-# of the coefficients. A loop leaves little of a moment unanswered: 19 rad/s2/(m/s), from brisk
-# flights of a Crazyflie, put calm ones off by 1.3 times the error of no change; 7 by 1.08 times
-_SIZES = np.array([0.5, 0.5, 0.5, 30.0, 10.0, 20.0, 10.0, 0.5, 5.0])
 # share of the loss: the prior's at a size from the start. Coefficients without excitation stay
 _PRIOR = 0.003 / 9.0
 _STARTS = 500  # predictions of a fit, spread over the flights
@@ -80,8 +65,7 @@ def fit_loop(
     sizes = np.concatenate([d + d.mean(axis=0) + _LEAST for d in far])[:, None, :, None]
     speeds = np.concatenate([part.log.rotor_speeds[part.rows] for part in thin])
     turning = vehicle.rotor_wrench(speeds)[:, 1:3] / np.diag(vehicle.inertia)[:2]  # rad/s2
-    usual = replace(_BEGIN, unmeasured=np.sqrt(np.square(turning).mean()))
-    begin = np.array(astuple(_DAMPED if damped else usual))
+    begin = np.nan_to_num(_DAMPED if damped else _USUAL, nan=np.sqrt((turning**2).mean()))
     free, shares = _DAMPING | (not damped), np.arange(1, _TIMES + 1) / _TIMES
     unit = np.diag(_SIZES)[free]  # units of the fitted numbers x (p,)
 
@@ -102,15 +86,13 @@ def fit_loop(
     for _ in range(_ROUNDS if near is None else _AGAIN):
         norms = np.linalg.norm(e, axis=-1)
         least = np.maximum(0.5 * np.median(norms, axis=(0, 1)), _LEAST)
-        root = 1.0 / np.sqrt(np.maximum(norms, least))[..., None]
-        moves = _STEP * np.eye(len(x))
-        changes = [(root * (off(x + move) - e)).reshape(len(e), -1) for move in moves]
-        slopes = np.stack(changes, axis=1) / _STEP  # (n, p, ..)
-        residual = (root * e).reshape(len(e), -1, 1)
-        strength = _PRIOR * np.square(residual).sum()
-        grams = np.vstack([slopes @ np.swapaxes(slopes, 1, 2), strength * np.eye(len(x))[None]])
-        gradients = np.vstack([(slopes @ residual)[..., 0], strength * x])
-        gram, before = grams.sum(axis=0), _loss(e, x)
+        root = np.sqrt(np.maximum(norms, least))[..., None]
+        residual, one = e / root, np.eye(len(x))
+        slopes = np.array([(off(x + move) - e) / root for move in _STEP * one]) / _STEP
+        strength = _PRIOR * (residual**2).sum()
+        gram = np.einsum("intqc,jntqc->ij", slopes, slopes, optimize=True) + strength * one
+        gradients = np.vstack([np.einsum("intqc,ntqc->ni", slopes, residual), strength * x])
+        before = _loss(e, x)
         for _ in range(6):
             lower = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
             aim = lower.T @ x - np.linalg.solve(lower, gradients.sum(axis=0))

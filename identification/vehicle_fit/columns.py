@@ -11,15 +11,16 @@ A column of one parameter has the name of its axis and of the parameter: ``Fx ro
 lift``.
 """
 
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.arrays import Array
+from ...runtime.arrays import Array, Mask
 from ..logs.table import NamedArrays, NamedNumbers, Names, Values
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece, Pieces
-from .model import PAIRS, Model, coefficients
+from .model import NONLINEAR, PAIRS, Model, coefficients
 from .spectra import BAND, Segment, segments_of
 
 # s at either end of a piece, outside all segments: the rotors' columns are set back by less, and
@@ -38,39 +39,48 @@ class BalanceSpectra(NamedTuple):
     """
 
     pieces: Pieces
+    model: Model
     centre: NamedNumbers  # nonlinear parameters: the columns are linear about them
     names: Names  # columns; the rotors' are the last
     rotors: int  # the number of these
-    segments: tuple[Segment, ...]
+    segments: list[Segment]
     seconds: float
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
-    def combined(self, model: Model, theta: Array) -> Array:
+    @property
+    def slow(self) -> Mask:
+        """Whether a column (c,) is the slow part of the one before."""
+        return np.array([name.startswith("slow ") for name in self.names])
+
+    def combined(self, theta: Array) -> Array:
         """Return the residual as a combination (6, 1 + ...) of a measured axis and all
         columns.
         """
-        values = model.values(theta)
-        gains = coefficients(model, values, self.names)
+        values = self.model.values(theta)
+        gains = coefficients(self.model, values, self.names)
         late = gains[:, -self.rotors :]
-        moved = (late * (values[name] - x) for name, x in self.centre.items())
-        return np.column_stack([np.ones(6), -gains, *(-x for x in moved)])
+        moved = [late * (values[name] - x) for name, x in self.centre.items()]
+        return -np.column_stack([-np.ones(6), gains, *moved])
 
 
 def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
     """Return the transforms of all pieces, linear about the nonlinear parameters of ``theta``."""
     values = model.values(theta)
-    centre = {name: values[name] for name in model.nonlinear}
-    segments: list[Segment] = []
+    centre = {name: values[name] for name in NONLINEAR if name in values}
+    segments = []
     for whole in pieces:
         late, ends = round(model.late / whole.period), round(MARGIN / whole.period)
-        piece, inner = whole.set_back(late), slice(ends, len(whole.t) - ends)
+        # the rotors' first or last sample holds at the end
+        rows = np.clip(np.arange(len(whole.t)) - late, 0, len(whole.t) - 1)
+        piece = whole.mapped(itemgetter(rows), "rotors", "voltage")
+        inner = slice(ends, len(whole.t) - ends)
         air, rotors = air_columns(piece, model), rotor_columns(piece, model, centre)
         base = np.column_stack([*rotors.values()])
         parts = [np.nan_to_num(piece.measured()), *air.values(), base]
-        for name in [name for name in centre if name in _STEP]:
-            there = centre | {name: centre[name] + _STEP[name]}
-            moved = np.column_stack([*rotor_columns(piece, model, there).values()])
-            parts.append((moved - base) / _STEP[name])
+        for name, step in _STEP.items():
+            if name in centre:
+                there = rotor_columns(piece, model, centre | {name: centre[name] + step})
+                parts.append((np.column_stack([*there.values()]) - base) / step)
         stacked = low_pass(np.column_stack(parts), model.band, piece.period)
         for s in segments_of(stacked[inner], piece.t[inner], piece.period, piece.log, model.band):
             turn = -2j * np.pi * s.frequency[:, None]
@@ -82,12 +92,14 @@ def balance(pieces: Pieces, model: Model, theta: Array) -> BalanceSpectra:
     names = (*air, *rotors)
     # white noise of each rotor's speed in a column: standard deviation times the root of the period
     noise = np.zeros((4, len(names)))
-    if model.speed_noise > 0.0 and centre.get("lag", 0.0) <= 0.0:
-        squares = [p.period * (4.0 * np.square(p.rotors)).mean(axis=0) for p in pieces]
+    if centre.get("lag", 0.0) <= 0.0:
+        squares = [p.period * (4.0 * p.rotors**2).mean(axis=0) for p in pieces]
         size = model.speed_noise * np.sqrt(np.average(squares, axis=0, weights=seconds))
         for letter, share in model.shares.items():
-            noise[:, names.index(f"{letter}0")] = size * share
-    return BalanceSpectra(pieces, centre, names, len(rotors), tuple(segments), seconds.sum(), noise)
+            for name in {f"{letter}2", f"slow {letter}2"}.intersection(names):
+                noise[:, names.index(name)] = size * share
+    sizes = len(rotors), segments, seconds.sum()
+    return BalanceSpectra(pieces, model, centre, names, *sizes, noise)
 
 
 def rotor_columns(piece: MotionPiece, model: Model, values: Values) -> NamedArrays:
@@ -96,18 +108,17 @@ def rotor_columns(piece: MotionPiece, model: Model, values: Values) -> NamedArra
     battery = np.ones(1)
     if model.voltage_ref > 0.0 and piece.voltage is not None:
         battery = np.power(piece.voltage / model.voltage_ref, values.get("gamma", 0.0))
-    out: NamedArrays = {}
-    for j, exponent in enumerate(model.exponents):
+    out = {}
+    for exponent in model.exponents:
         thrust = speed**exponent * battery[:, None]
         for letter, share in model.shares.items():
-            out[f"{letter}{j}"] = thrust @ share
+            out[name := f"{letter}{exponent}"] = thrust @ share
             if letter != "T":
-                slow = low_pass(out[f"{letter}{j}"], ANSWERED_HZ, piece.period)
-                out[f"slow {letter}{j}"] = slow
-    momentum, w = speed @ model.spin, piece.angular_velocity
-    smooth = low_pass(momentum, 2.0 * BAND, piece.period)
-    out["Mz Jr"] = -derivative(smooth[:, None], piece.period)[:, 0]
-    out["Mx Jr"], out["My Jr"] = -w[:, 1] * momentum, w[:, 0] * momentum
+                out[f"slow {name}"] = low_pass(out[name], ANSWERED_HZ, piece.period)
+    momentum = speed @ model.spin[:, None]  # (n, 1)
+    across, smooth = piece.angular_velocity * momentum, low_pass(momentum, 2.0 * BAND, piece.period)
+    out["Mz Jr"] = -derivative(smooth, piece.period)[:, 0]
+    out["Mx Jr"], out["My Jr"] = -across[:, 1], across[:, 0]
     if piece.velocity is not None:
         drag = -speed[:, :, None] * _local(piece, piece.velocity, model)
         for i, axis in enumerate("xyz"):
@@ -143,5 +154,5 @@ def air_columns(piece: MotionPiece, model: Model) -> NamedArrays:
         for a, v in zip("xyz", piece.velocity.T, strict=True):
             out[f"F{a} linear drag {a}"], out[f"F{a} quadratic drag {a}"] = -v, -speed * v
         across = _local(piece, piece.velocity, model)[:, :, :2]
-        out |= _at_rotors(0.25 * np.square(across).sum(axis=2), 2, "lift", model)
+        out |= _at_rotors(0.25 * (across**2).sum(axis=2), 2, "lift", model)
     return out

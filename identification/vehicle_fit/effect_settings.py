@@ -9,10 +9,7 @@ def effect_of(role: str) -> str:
     return playing(Role(role))[0]
 
 
-def estimate_name(role: str, index: int) -> str:
-    """Return the name of a role's estimate: effect and coefficient."""
-    effect = effect_of(role)
-    return f"{effect} {get(effect).coefficients[index].name}"
+LAG = effect_of(Role.LAG)
 
 
 def coefficient_of(vehicle: Vehicle, role: Role, index: int) -> float:

@@ -3,29 +3,37 @@ of quantities missing from the flight.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq
 
-from ...dynamics.effects import Role
+from ...dynamics.effects import Role, get
 from ...runtime.errors import InputError
 from ..logs.table import Values
-from .effect_settings import effect_of, estimate_name
-from .geometry import FLAT, GYRATION, VOLTAGE_EXPONENTS, YAW_REACH, Interval
+from .effect_settings import LAG, effect_of
+from .geometry import (
+    COMMAND_SPREAD,
+    FLAT,
+    GYRATION,
+    THRUST_SPREAD,
+    VOLTAGE_EXPONENTS,
+    YAW_REACH,
+    Interval,
+)
 from .parameters import FURTHER
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, Estimated, told
 from .solve import Function, VehicleFit
 
-UNKNOWN: Interval = (math.nan, math.nan, math.nan)
-UNIT: Interval = (1.0, 1.0, 1.0)
+UNKNOWN = (math.nan, math.nan, math.nan)
+UNIT = (1.0, 1.0, 1.0)
 Estimates = Iterator[Estimate]
 
 
-def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
+def thrust_of(values: Values, u: float) -> float:
     """Return one rotor's thrust (N) at a speed in rad/s or a command."""
-    return sum(values[f"a{j}"] * u**e for j, e in enumerate(exponents))
+    return sum(values.get(f"a{e}", 0.0) * u**e for e in range(3))
 
 
 def _times(known: Interval, by: Interval | float) -> Interval:
@@ -61,28 +69,35 @@ def _estimate(
     return Estimate(name, *known, unit, status, how)
 
 
-def _positive(fit: VehicleFit, name: str, what: str | Function, unit: str, how: str) -> Estimate:
-    known = fit.interval(what)
+def _positive(
+    fit: VehicleFit, name: str, what: str | Function, unit: str, how: str, spread: float = 0.0
+) -> Estimate:
+    """Return the estimate of a positive quantity with a spread from day to day, as a share."""
+    known = value, low, high = fit.interval(what)
+    if spread and low > 0.0:
+        factor = math.exp(math.hypot(math.log(high / value), 1.96 * spread))
+        known = value, value / factor, value * factor
+        how = f"{how}; the interval has {100.0 * spread:g} % from day to day"
     wide = f"{how}: the interval is wider than half the value"
     return _estimate(name, known, unit, how, "" if told(known) else wide)
 
 
 def _thrust(fit: VehicleFit) -> Estimates:
     """Yield the thrust coefficient, or the curve of commands."""
-    of, exponents, pieces = fit.model.sources, fit.model.exponents, fit.balance.pieces
+    of, pieces = fit.model.sources, fit.balance.pieces
     how = f"{of.force} along body z against {of.rotors}, with the mass given"
     if not fit.model.commands:
-        yield _positive(fit, "k", "a0", "N/(rad/s)^2", how)
+        yield _positive(fit, "k", "a2", "N/(rad/s)^2", how, THRUST_SPREAD)
         return
-    for j, e in enumerate(exponents):
-        yield _estimate(f"thrust u^{e}", fit.interval(f"a{j}", False), "N", how)
+    for e in fit.model.exponents:
+        yield _estimate(f"thrust u^{e}", fit.interval(f"a{e}", False), "N", how)
     flown = np.concatenate([p.rotors for p in pieces])
     low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
     beyond = f"continues the curve beyond the commands flown, {low:.2f} to {high:.2f}"
     for u in (0.25, 0.5, 0.75, 1.0):
-        name, thrust = f"thrust({u:g})", partial(thrust_of, exponents=exponents, u=u)
+        name, thrust = f"thrust({u:g})", partial(thrust_of, u=u)
         if low <= u <= high:
-            yield _positive(fit, name, thrust, "N", how)
+            yield _positive(fit, name, thrust, "N", how, COMMAND_SPREAD)
         else:
             yield _estimate(name, fit.interval(thrust), "N", beyond, status=ASSUMED)
 
@@ -90,7 +105,7 @@ def _thrust(fit: VehicleFit) -> Estimates:
         weight = fit.model.weight * math.pow(share, -values.get("gamma", 0.0))
 
         def excess(u: float) -> float:
-            return 4.0 * thrust_of(values, exponents, u) - weight
+            return 4.0 * thrust_of(values, u) - weight
 
         # a curve of few flights may carry the weight at no command, or at none up to 2
         low, high = excess(0.0), excess(2.0)
@@ -166,8 +181,7 @@ def _size(fit: VehicleFit) -> Estimates:
             yield _estimate(f"l/{axis}{axis[1]}", (value, low, high), "1/(kg m)", how)
     for name in ("Jxy", "Jxz", "Jyz") if "products of inertia" in fit.kept else ():
         product = _times(fit.interval(name, False), arm)
-        unsure = fit.doubt or fit.kept["products of inertia"]
-        yield _estimate(name, product, "kg m2", f"{rate} across axes", unsure, status)
+        yield _estimate(name, product, "kg m2", f"{rate} across axes", fit.doubt, status)
 
 
 def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
@@ -187,7 +201,7 @@ def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
         how = f"{how}, with the Jzz that is assumed"
     else:
         ratio, status = _times(fit.interval("reach"), arm), IDENTIFIED
-        product = fit.interval(lambda v: v["reach"] * v["a0"])
+        product = fit.interval(lambda v: v["reach"] * v["a2"])
     yield _estimate("p/k", ratio, "m", how, status=status)
     if k is not None:
         yield _estimate("p", product or _times(ratio, k.value), "Nm/(rad/s)^2", how, status=status)
@@ -195,22 +209,19 @@ def _yaw(fit: VehicleFit, said: Estimated, arm: Interval) -> Estimates:
 
 def _lag(fit: VehicleFit) -> Estimates:
     """Yield the rotors' lag, and the time offset of the motion."""
-    name, how = effect_of(Role.LAG), f"force and turning against {fit.model.sources.rotors}"
+    known, status = UNKNOWN, NOTHING
+    how = (
+        "force follows the logged rotor speeds at once: they are measured, and no command is "
+        "logged beside them"
+    )
     if "lag" in fit.model.free:
-        if not fit.model.commands:
-            how += ", which therefore are commanded, not measured"
-        known = fit.interval("lag")
+        known, how = fit.interval("lag"), f"force and turning against {fit.model.sources.rotors}"
+        how += ", which therefore are commanded, not measured" * (not fit.model.commands)
         alike = "a time offset of the motion does nearly the same here"
         doubt = fit.doubt or alike * (not told(known))
         # without the fit's value the thrust would come early
-        status = ASSUMED if doubt else IDENTIFIED
-        yield _estimate(name, known, "s", doubt or how, status=status)
-    else:
-        doubt = (
-            "force follows the logged rotor speeds at once: they are measured, and no command is "
-            "logged beside them"
-        )
-        yield _estimate(name, UNKNOWN, "s", how, doubt)
+        status, how = (ASSUMED, doubt) if doubt else (IDENTIFIED, how)
+    yield Estimate(LAG, *known, "s", status, how)
     offset = fit.interval("delay", False)
     yield _estimate("time_offset", offset, "s", "of the motion behind the rotors")
 
@@ -242,21 +253,15 @@ def _air(fit: VehicleFit, arm: Interval) -> Estimates:
         why = "no velocity is known: the logs have no position"
         yield _estimate("drag", UNKNOWN, "N/(m/s)", "", why)
         return
-    hows = {
-        "force": f"{of.force} along body x and y against velocity",
-        "thrust": "force along body z",
-        "turning": f"{of.rate}, its own derivative against it and against velocity",
-    }
     for kind, effect in FURTHER.items():
         if not effect.role or kind not in fit.kept:
             continue
-        turns = effect.shows == "turning"
-        size = effect.factor * (arm[0] if turns else 1.0)
-        why = (fit.doubt if turns else "") or fit.kept[kind]
+        size = effect.factor * (arm[0] if effect.turns else 1.0)
+        why, how = fit.doubt * effect.turns, effect.how.format(**vars(of))
         for index, parameter in enumerate(effect.parameters, effect.first):
-            known = _times(fit.interval(parameter, turns), size)
-            estimate = _of_effect(effect.role, index, known, hows[effect.shows], why)
-            yield estimate._replace(of_force=not turns)
+            known = _times(fit.interval(parameter, effect.turns), size)
+            estimate = _of_effect(effect.role, index, known, how, why)
+            yield estimate._replace(of_force=not effect.turns)
     if fit.hidden:
         value, deviation, least = (arm[0] * x for x in fit.hidden)
         wide = fit.width * deviation
@@ -272,4 +277,6 @@ def _air(fit: VehicleFit, arm: Interval) -> Estimates:
 
 def _of_effect(role: str, index: int, known: Interval, how: str, doubt: str) -> Estimate:
     """Return the estimate of a coefficient of a role's effect."""
-    return _estimate(estimate_name(role, index), known, Role(role).units[index], how, doubt)
+    effect = effect_of(role)
+    coefficient = get(effect).coefficients[index]
+    return _estimate(f"{effect} {coefficient.name}", known, coefficient.unit, how, doubt)

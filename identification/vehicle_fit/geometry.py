@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...dynamics.vehicle import QUADRANT
 from ...runtime.arrays import Array
 from ...runtime.errors import InputError
 
 Interval = tuple[float, float, float]  # value, low and high
-QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
-SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
+
 GRAVITY = 9.81  # m/s2
 
 

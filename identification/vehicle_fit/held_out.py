@@ -12,14 +12,14 @@ hold the trajectory, too: on a slower flight of a racer the body rate was off by
 of no change, and by 0.9 times with two dampings.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...dynamics.effects import Role, get
-from ...dynamics.vehicle import LoopReaction, ModelStatus, Standing, Vehicle
+from ...dynamics.vehicle import ModelStatus, Standing, Vehicle
 from ...runtime.arrays import Array, Mask
 from ..logs.flight_log import Logs
 from ..prediction import (
@@ -33,7 +33,6 @@ from ..prediction import (
 from .closed_loop import LoopFit, fit_loop
 from .model import coefficients
 from .solve import VehicleFit, refitted
-from .spectra import Spectra
 
 FOLDS = 3  # every third segment is held out at a time
 LEAST_HZ = 0.4  # lowest frequency of the shares: below it lies the mean, such as the weight
@@ -64,46 +63,22 @@ class HeldOut(NamedTuple):
     why: str = ""
 
 
-class _HeldParts(NamedTuple):
-    """Starts in the segments of a fit, and the parts held out in turn."""
-
-    starts: list[LoggedStarts]  # of each log
-    refits: list[tuple[str, Mask, VehicleFit]]  # where, kept segments (s,), their fit
-
-    def errors(self, models: Callable[[VehicleFit, Mask], Models]) -> Errors:
-        """Return the errors of models made of each refit and the segments that it keeps."""
-        errors: Errors = {}
-        for where, kept, part in self.refits:
-            starts = [of.those(~kept[of.segment]) for of in self.starts]
-            if any(len(of.rows) for of in starts):
-                vehicles = models(part, kept)
-                said = errors.setdefault(where, {name: [] for name in vehicles})
-                offs = errors_at(starts, list(vehicles.values()))
-                for name, off in zip(vehicles, offs, strict=True):
-                    said[name].append(off)
-        return errors
-
-
-def _held_parts(logs: Logs, fit: VehicleFit, vehicle: Vehicle) -> _HeldParts:
-    """Return the starts in the segments of a fit.
-
-    Raises:
-        InputError: too little would be left of the logs.
-    """
-    number = np.array([s.log for s in fit.balance.segments])
-    spans, starts = [s.span for s in fit.balance.segments], []
-    for i, log in enumerate(logs):
-        own = np.flatnonzero(number == i)
-        part = logged_starts(log, vehicle, [spans[k] for k in own], _HORIZON)
-        starts.append(part._replace(segment=own[part.segment]))
-    folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
-    refits = [
-        (where, *each)
-        for where, fold in folds.items()
-        if np.ptp(fold) > 0
-        for each in refitted(fit, fold)
-    ]
-    return _HeldParts(starts, refits)
+def _errors(
+    all_starts: Sequence[LoggedStarts],
+    refits: Sequence[tuple[str, Mask, VehicleFit]],
+    models: Callable[[VehicleFit, Mask], Models],
+) -> Errors:
+    """Return the errors of models made of each refit and the segments that it keeps."""
+    errors: Errors = {}
+    for where, kept, part in refits:
+        starts = [of.those(~kept[of.segment]) for of in all_starts]
+        if any(len(of.rows) for of in starts):
+            vehicles = models(part, kept)
+            said = errors.setdefault(where, {name: [] for name in vehicles})
+            offs = errors_at(starts, list(vehicles.values()))
+            for name, off in zip(vehicles, offs, strict=True):
+                said[name].append(off)
+    return errors
 
 
 def held_out(
@@ -122,32 +97,44 @@ def held_out(
     Raises:
         InputError: too little would be left of the logs.
     """
-    if not all(log.has_pose for log in logs):
+    if not fit.model.sources.velocity:
         return _by_balance(fit)
-    whole = vehicle_of(fit, "")
-    parts = _held_parts(logs, fit, whole)
-    errors = parts.errors(lambda part, _: models_of(vehicle_of(part, "")))
+    whole, starts, segments = vehicle_of(fit, ""), [], fit.balance.segments
+    number = np.array([s.log for s in segments])
+    for i, log in enumerate(logs):
+        own = np.flatnonzero(number == i)
+        of_log = logged_starts(log, whole, [segments[k].span for k in own], _HORIZON)
+        starts.append(of_log._replace(segment=own[of_log.segment]))
+    folds = {"held_out_blocks": np.arange(len(number)) % FOLDS, OTHER_FLIGHTS: number}
+    refits = [
+        (where, *each)
+        for where, fold in folds.items()
+        if np.ptp(fold) > 0
+        for each in refitted(fit, fold)
+    ]
+    errors = _errors(starts, refits, lambda part, _: models_of(vehicle_of(part, "")))
     loop: LoopFit | None = None
     if not errors:
         # torques refuted on the flight of their fit were off by up to 37 times the error of no
         # change on others (10 Crazyflie flights of 9 s)
-        if any(len(of.rows) for of in parts.starts):
-            loop = fit_loop(parts.starts, whole, damped=True)
+        if any(len(of.rows) for of in starts):
+            loop = fit_loop(starts, whole, damped=True)
             damped = replace(whole, closed_loop=loop.loop)
-            near, far = (of.model[:, -1] for of in errors_at(parts.starts, [damped, whole]))
+            near, far = (of.model[:, -1] for of in errors_at(starts, [damped, whole]))
             loop = loop if np.log(near / far).mean() < 0.0 else None
         return HeldOut({}, "", loop)
     stands, why = standing(errors), ""
     if stands not in ("torque", WHOLE):
         why, alone = _reason(errors), OTHER_FLIGHTS not in errors
-        fitted = loop = fit_loop(parts.starts, vehicle_of(fit, why), damped=alone)
+        fitted = loop = fit_loop(starts, vehicle_of(fit, why), damped=alone)
 
         def without(part: VehicleFit, kept: Mask) -> Models:
             vehicle = vehicle_of(part, why)
-            starts = [of.those(kept[of.segment]) for of in parts.starts]
-            return loops_of(vehicle, fit_loop(starts, vehicle, fitted.loop, alone).loop)
+            others = [of.those(kept[of.segment]) for of in starts]
+            found = fit_loop(others, vehicle, fitted.loop, alone)
+            return loops_of(replace(vehicle, closed_loop=found.loop))
 
-        further = parts.errors(without)
+        further = _errors(starts, refits, without)
         errors = {where: {**each, **further[where]} for where, each in errors.items()}
         stands = standing(errors)
     pooled = {
@@ -173,11 +160,11 @@ def models_of(vehicle: Vehicle) -> Models:
     }
 
 
-def loops_of(vehicle: Vehicle, loop: LoopReaction) -> Models:
-    """Return the models with a loop's reaction in place of the torque, and the reaction alone."""
+def loops_of(vehicle: Vehicle) -> Models:
+    """Return the models with the loop's reaction in place of the torque, and the reaction alone."""
     models = models_of(vehicle)
     return {
-        f"{name}, closed loop": replace(models[name], closed_loop=loop)
+        f"{name}, closed loop": replace(models[name], closed_loop=vehicle.closed_loop)
         for name in (NO_CHANGE, SIMPLEST, "force")
     }
 
@@ -232,22 +219,17 @@ def _by_balance(fit: VehicleFit) -> HeldOut:
     return HeldOut({}, "torque" if force else WHOLE)
 
 
-def powers(fit: VehicleFit, spectra: Spectra | None = None) -> Array:
+def powers(fit: VehicleFit, by_noise: bool = False) -> Array:
     """Return the power that a fit leaves of specific force and turning in each segment, and all
-    power (s, 2, 6), from ``LEAST_HZ`` on. ``spectra`` divide the power of each frequency.
+    power (s, 2, 6), from ``LEAST_HZ`` on; ``by_noise``: each frequency's over that of the noise.
     """
     names, out = fit.balance.names, []
     model = coefficients(fit.model, fit.values, names)
-    for i, s in enumerate(fit.balance.segments):
+    for s, spectrum in zip(fit.balance.segments, fit.spectra, strict=True):
         inside = s.frequency >= LEAST_HZ
-        unit = 1.0 if spectra is None else spectra[i][inside]
+        unit = spectrum[inside] if by_noise else 1.0
         measured = s.columns[:, inside, :6]
         residual = measured - s.columns[:, inside, 6 : 6 + len(names)] @ model.T
         both = np.abs([residual, measured])
         out.append((both**2 / unit).sum(axis=(1, 2)))
     return np.array(out)
-
-
-def refuted(vehicle: Vehicle) -> list[str]:
-    """Return the parts of a vehicle's model that data outside its fit refuted."""
-    return [part for part in ("force", "torque") if getattr(vehicle.status, part) == "refuted"]

@@ -14,25 +14,24 @@ from typing import TypeVar
 
 import numpy as np
 
+from ...dynamics.vehicle import SPIN
 from ...runtime.arrays import Array
 from ..logs.table import NamedArrays, NamedNumbers, Names, Values
 from .channels import Sources
-from .geometry import GRAVITY, SPIN, Geometry
+from .geometry import GRAVITY, Geometry
 from .spectra import BAND
 
 T = TypeVar("T", float, Array)
-NONLINEAR = ("lag", "gamma", "delay")  # s, 1, s; in the order of their columns
+# parameters inside the columns themselves: s, 1, s; in the order of their columns
+NONLINEAR = ("lag", "gamma", "delay")
 # inertia in logarithms: positive, and with intervals of ratios
 LOGARITHMIC = ("Jx", "Jy", "Jz")
 ROWS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")  # force, and torque about the centre of mass
 PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]  # of axes
-# e_ijk of a cross product
-_CROSS = np.zeros((3, 3, 3))
-_CROSS[[0, 1, 2], [1, 2, 0], [2, 0, 1]], _CROSS[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0, -1.0
+_CROSS = np.cross(np.eye(3)[:, None], np.eye(3))  # e_ijk of a cross product
 # symmetric matrices (6, 3, 3): each picks a pair from the products of angular velocities
-_PICK = np.zeros((6, 3, 3))
-for _at, (_i, _j) in enumerate(PAIRS):
-    _PICK[_at, _i, _j] = _PICK[_at, _j, _i] = 1.0
+_PICK = np.array([np.outer(*np.eye(3)[[i, j]]) for i, j in PAIRS])
+_PICK = np.maximum(_PICK, np.swapaxes(_PICK, 1, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +41,7 @@ class Model:
     mass: float  # kg
     geometry: Geometry
     sources: Sources
-    exponents: tuple[int, ...] = (2,)  # basis functions of thrust
+    exponents: tuple[int, ...] = (2,)  # of the basis functions of thrust; "a2" is that of 2
     voltage_ref: float = 0.0  # V; 0: voltage is not used
     opposite: bool = False  # rotors turn against their usual senses
     band: float = BAND  # Hz: force and turning are compared up to here
@@ -73,14 +72,9 @@ class Model:
 
     @property
     def shares(self) -> NamedArrays:
-        """Each rotor's share (4,) in thrust T and in the torques X, Y and Z, m."""
+        """Each rotor's share (4,) in thrust T and in the torques x, y and z, m."""
         x, y = self.geometry.positions[:, :2].T
-        return {"T": np.ones(4), "X": y, "Y": -x, "Z": -self.spin}
-
-    @property
-    def nonlinear(self) -> Names:
-        """Names of the parameters inside the columns themselves."""
-        return tuple(name for name in NONLINEAR if name in self.free)
+        return {"T": np.ones(4), "x": y, "y": -x, "z": -self.spin}
 
     def values(self, theta: Array) -> NamedNumbers:
         """Return the free parameters in SI units."""
@@ -101,30 +95,29 @@ def inertia_of(p: Values) -> Array:
 
 
 def coefficients(model: Model, p: Values, names: Names) -> Array:
-    """Return the coefficients (6, c) of the columns for parameters in SI units."""
+    """Return the coefficients (6, c) of the columns for parameters in SI units; the first ten are
+    the constant, angular acceleration, and the products of angular velocities.
+    """
     inertia, lever = inertia_of(p), np.array([p["rx"], p["ry"], p["rz"]])
     out = np.zeros((6, len(names)))
     for column, name in enumerate(names):
         place, _, parameter = name.partition(" ")
         if place in ROWS:
             out[ROWS.index(place), column] = p.get(parameter, 0.0)
-    for j in range(len(model.exponents)):
-        thrust = np.array([p["tilt x"], p["tilt y"], 1.0, -p["cy"], p["cx"], 0.0])
-        out[:, names.index(f"T{j}")] = p[f"a{j}"] * thrust
+    thrust = np.array([p["tilt x"], p["tilt y"], 1.0, -p["cy"], p["cx"], 0.0])
+    for e in model.exponents:
+        out[:, names.index(f"T{e}")] = p[f"a{e}"] * thrust
         for row, (axis, reach) in enumerate(zip("xyz", (1.0, 1.0, p["reach"]), strict=True), 3):
-            column = names.index(f"{axis.upper()}{j}")
-            out[row, column] = p[f"a{j}"] * reach
+            column = names.index(f"{axis}{e}")
+            out[row, column] = p[f"a{e}"] * reach
             # the slow part stands behind
             out[row, column + 1] = -p.get(f"answered {axis}", 0.0) * out[row, column]
     out[:3] /= model.mass
-    # behind the constant: angular acceleration, and the products of angular velocities
-    one = names.index("1")
-    turning, products = slice(one + 1, one + 4), slice(one + 4, one + 10)
-    out[:3, turning] = _CROSS @ lever
-    out[:3, products] = (_PICK @ lever).T - np.outer(lever, _PICK.trace(axis1=1, axis2=2))
-    out[3:, products] = -np.einsum("ijk,pkj->ip", _CROSS, inertia @ _PICK)
+    out[:3, 1:4] = _CROSS @ lever
+    out[:3, 4:10] = (_PICK @ lever).T - np.outer(lever, _PICK.trace(axis1=1, axis2=2))
+    out[3:, 4:10] = -np.einsum("ijk,pkj->ip", _CROSS, inertia @ _PICK)
     out[3:] = np.linalg.solve(inertia, out[3:])
-    out[:, one] = [p.get(f"{kind} bias {a}", 0.0) for kind in ("force", "turn") for a in "xyz"]
+    out[:, 0] = [p.get(f"{kind} bias {a}", 0.0) for kind in ("force", "turn") for a in "xyz"]
     return out
 
 

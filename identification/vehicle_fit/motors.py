@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ...runtime.arrays import Array
 from ..logs.table import ArrayPair
@@ -29,9 +29,9 @@ class MotorResponse(NamedTuple):
 
 
 def motor_response(pieces: Pieces) -> MotorResponse | None:
-    """Return how speeds follow commands; None if a piece lacks either, or commands do not move."""
+    """Return how speeds follow commands; None if a piece lacks these, or commands do not move."""
     known = [(p.command, p.period) for p in pieces if p.command is not None]
-    if len(known) < len(pieces) or any(p.rotor_speeds is None for p in pieces):
+    if len(known) < len(pieces):
         return None
 
     def columns(lag: float) -> Array:
@@ -48,7 +48,7 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
         return best, target - x @ best
 
     likeliest = minimize_scalar(
-        lambda log_lag: np.square(fitted(math.exp(log_lag))[1]).sum(),
+        lambda log_lag: (fitted(math.exp(log_lag))[1] ** 2).sum(),
         bounds=np.log(_LAGS),
         method="bounded",
         options={"xatol": 1e-3},
@@ -64,6 +64,6 @@ def motor_response(pieces: Pieces) -> MotorResponse | None:
     scores = np.bincount(block, residual * (moves @ inverse[-1]))
     least = max(len(scores) - 1, 1)
     size = math.sqrt(scores @ scores * len(scores) / least)
-    width = student.ppf(0.975, max(least, 3)) * size
+    width = stdtrit(max(least, 3), 0.975) * size
     interval = (lag, max(lag - width, 0.0), lag + width)
     return MotorResponse(best, interval, residual.std() / target.std())

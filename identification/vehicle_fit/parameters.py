@@ -4,6 +4,7 @@ by axis, with every coefficient linear.
 
 import math
 from collections import ChainMap
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -40,7 +41,7 @@ _FIRST_DELAYS = np.linspace(0.0, 0.08, 9)
 _OPPOSED = 0.15
 _SWING_HZ = (0.5, 8.0)
 
-QUANTITIES: Data = read_yaml(Path(__file__).with_name("quantities.yaml"), "quantities")
+QUANTITIES = read_yaml(Path(__file__).with_name("quantities.yaml"), "quantities")
 
 
 class Further(NamedTuple):
@@ -50,12 +51,13 @@ class Further(NamedTuple):
     role: str = ""
     first: int = 0
     factor: float = 1.0
-    shows: str = ""
+    how: str = ""
+    turns: bool = False
     of_speeds: bool = False
     positive: bool = True
 
 
-FURTHER: dict[str, Further] = {n: Further(**row) for n, row in QUANTITIES["effects"].items()}
+FURTHER = {n: Further(**row) for n, row in QUANTITIES["effects"].items()}
 
 
 def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, Array]:
@@ -68,9 +70,9 @@ def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, A
     columns = [rotor_columns(piece, model, {}) for piece in pieces]
     count, mass, arm = len(model.exponents), model.mass, model.geometry.arm
     # each basis function's coefficient if it alone carried the weight
-    totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(count)]
-    each = {f"a{j}": model.weight / max(x.mean(), 1e-12) for j, x in enumerate(totals)}
-    shares = [a / count for a in each.values()]
+    totals = {e: np.concatenate([c[f"T{e}"] for c in columns]) for e in model.exponents}
+    each = {f"a{e}": model.weight / max(x.mean(), 1e-12) for e, x in totals.items()}
+    shares = {e: each[f"a{e}"] / count for e in totals}
     gains, alike = _first_gains(pieces, columns, shares, _SWING_HZ)
     # a loop that answers a swinging load opposes its own slow torque, and no quick one
     _, quick = _first_gains(pieces, columns, shares, (ANSWERED_HZ, BAND))
@@ -109,31 +111,27 @@ def first_model(pieces: Pieces, model: Model, *nonlinear: str) -> tuple[Model, A
 
 
 def _first_gains(
-    pieces: Pieces, columns: list[NamedArrays], thrust: list[float], band: Pair
+    pieces: Pieces, columns: list[NamedArrays], thrust: Mapping[int, float], band: Pair
 ) -> ArrayPair:
     """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly, and their correlation
-    (3,) in a ``band`` in Hz. About x and y the first is the inertia's inverse, about z the inverse
-    times torque over thrust (m). Each is taken at the delay, up to 80 ms, of the largest
-    correlation of either sign.
+    (3,) in a ``band`` in Hz. ``thrust`` is a coefficient for each exponent. About x and y the first
+    is the inertia's inverse, about z the inverse times torque over thrust (m). Each is taken at the
+    delay, up to 80 ms, of the largest correlation of either sign.
     """
     cross, power, turned = np.zeros((len(_FIRST_DELAYS), 3)), np.zeros(3), np.zeros(3)
     for piece, column in zip(pieces, columns, strict=True):
         torque = np.sum(
-            [[a * column[f"{axis}{j}"] for axis in "XYZ"] for j, a in enumerate(thrust)], axis=0
+            [[a * column[f"{axis}{e}"] for axis in "xyz"] for e, a in thrust.items()], axis=0
         )
         # turning is the integral of torque: compared where neither is differentiated
         spin = np.cumsum(torque.T - torque.mean(axis=1), axis=0) * piece.period
-        sections = butter(
-            2,
-            [min(2.0 * band[0] * piece.period, 0.8), min(0.9, 2.0 * band[1] * piece.period)],
-            btype="bandpass",
-            output="sos",
-        )
+        ends = np.minimum(2.0 * piece.period * np.array(band), (0.8, 0.9))
+        sections = butter(2, ends, btype="bandpass", output="sos")
         spin, rate = (sosfiltfilt(sections, x, axis=0) for x in (spin, piece.angular_velocity))
         late = np.rint(_FIRST_DELAYS / piece.period).astype(int)
         cross += [(spin[: len(spin) - n] * rate[n:]).sum(axis=0) for n in late]
-        power += np.square(spin).sum(axis=0)
-        turned += np.square(rate).sum(axis=0)
+        power += (spin**2).sum(axis=0)
+        turned += (rate**2).sum(axis=0)
     most = cross[np.abs(cross).argmax(axis=0), range(3)]
     least = np.finfo(float).tiny
     return most / np.maximum(power, least), most / np.maximum(np.sqrt(power * turned), least)

@@ -13,14 +13,14 @@ from ...runtime.arrays import Array
 from ...runtime.drawing import ESTIMATE, TRUTH, new_figure, styled
 from ...runtime.page_files import write_png, write_text
 from ...runtime.plain_values import plain
-from ..logs.table import ArrayPair, Data, Names
+from ..logs.table import Data, Names
 from ..motion.smoothing import low_pass
 from ..prediction import QUANTITIES, PredictionErrors
 from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
-from .held_out import LEAST_HZ, powers, refuted
+from .held_out import LEAST_HZ, powers
 from .model import coefficients
-from .result import ASSUMED, IDENTIFIED, NOTHING, Identified
+from .result import Identified, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,56 +60,24 @@ def identified_data(identified: Identified) -> Data:
         ends = errors.model, errors.still, simplest.model
         for name, *of in zip(QUANTITIES, QUANTITIES.values(), *ends, strict=True):
             data[where][name.replace(" ", "_")] = dict(zip(keys, of, strict=True))
-    told: Data = plain(data)
-    return told
+    return dict(plain(data))
 
 
 def headline(identified: Identified) -> str:
     """Return one sentence: parts refuted by held-out flight, identified quantities with half of
     their 95 % interval, and assumed ones.
     """
-    parts = " and the ".join(refuted(identified.vehicle))
-    begin = f"held-out flight refutes the {parts}; " if parts else ""
-    thrust = "thrust(0.5)" if identified.fit.model.commands else "k"
-    shown = [identified.estimates[name] for name in (thrust, "Jxx", "Jyy", "Jzz", "p/k")]
-    assumed = ", ".join(e.name for e in shown if e.status in (ASSUMED, NOTHING))
-    told = ", ".join(
-        f"{e.name} {e.value:.3g} ± {0.5 * (e.high - e.low):.2g} {e.unit}"
-        for e in shown
-        if e.status == IDENTIFIED
-    )
-    rest = f"; assumed, since these logs do not tell: {assumed}" if assumed else ""
-    return f"{begin}identified: {told or 'nothing'}{rest}"
+    return text_of("headline", it=identified)
 
 
 def use_of(identified: Identified) -> str:
     """Return one sentence: the use of the vehicle's file for predictions."""
-    parts = refuted(identified.vehicle)
-    if identified.vehicle.status.force == ASSUMED:
-        return "Use: nothing could be held out, so that no number is confirmed. Fly longer."
-    if identified.vehicle.closed_loop is not None:
-        kept = "an unchanged velocity" if "force" in parts else "the vehicle for force"
-        return (
-            f"Use: {kept}, and the flight loop's reaction for the body rate (predict does both). "
-            "Plant and tasks fly assumed inertia and reaction torque."
-        )
-    return {
-        "": "Use: this vehicle.",
-        "force": "Use: the vehicle for torque, with an unchanged velocity (predict does both).",
-        "torque": "Use: the vehicle for force, with an unchanged body rate (predict does both). "
-        "Inertia and reaction torque are assumed.",
-        "force torque": "Use: assume an unchanged velocity and body rate; the vehicle predicts no "
-        "better. Fly as advised and identify again.",
-    }[" ".join(parts)]
+    return text_of("use", v=identified.vehicle)
 
 
 def reasons_of(found: Identified) -> list[str]:
     """Return why quantities are assumed or not identifiable, a line for each reason."""
-    names: dict[str, list[str]] = {}
-    for e in found.estimates.values():
-        if e.status in (ASSUMED, NOTHING):
-            names.setdefault(e.how.removeprefix(f"{NOTHING}: "), []).append(e.name)
-    return [f"{', '.join(of)}: {why}" for why, of in names.items()]
+    return text_of("reasons", estimates=found.estimates).splitlines()
 
 
 def table_of(errors: PredictionErrors, simplest: PredictionErrors) -> list[Names]:
@@ -149,23 +117,19 @@ def write_identified(identified: Identified, path: Path) -> list[Path]:
     return written
 
 
-def _fitted(identified: Identified, piece: MotionPiece) -> ArrayPair:
+def _fitted(identified: Identified, piece: MotionPiece) -> list[Array]:
     """Return a piece's measured and fitted specific force (m/s2) and angular acceleration (rad/s2).
 
     Both are (n, 6), behind the picture's low-pass and within the band of the fit.
     """
     fit = identified.fit
-    then = piece.t - fit.values["delay"]
-    columns = {
-        n: np.interp(then, piece.t, x)
-        for n, x in rotor_columns(piece, fit.model, fit.values).items()
-    }
-    columns |= air_columns(piece, fit.model)
+    then, columns = piece.t - fit.values["delay"], air_columns(piece, fit.model)
+    for name, x in rotor_columns(piece, fit.model, fit.values).items():
+        columns[name] = np.interp(then, piece.t, x)
     gains = coefficients(fit.model, fit.values, tuple(columns))
     model = np.column_stack(list(columns.values())) @ gains.T
     shown_hz = min(_SHOWN_HZ, fit.model.band)
-    measured = piece.measured()
-    return low_pass(measured, shown_hz, piece.period), low_pass(model, shown_hz, piece.period)
+    return [low_pass(x, shown_hz, piece.period) for x in (piece.measured(), model)]
 
 
 def explained(identified: Identified) -> Array:
@@ -173,7 +137,7 @@ def explained(identified: Identified) -> Array:
     band. Each frequency counts by its ratio to the noise; NaN without a measurement.
     """
     fit = identified.fit
-    left, total = powers(fit, fit.spectra).sum(axis=0)
+    left, total = powers(fit, by_noise=True).sum(axis=0)
     return np.asarray(np.clip(1.0 - left / np.where(total > 0.0, total, np.nan), 0.0, 1.0))
 
 

@@ -1,9 +1,10 @@
 """The result of an identification."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ...dynamics.vehicle import Vehicle
+from ...runtime.page_files import page_template
 from ..logs.table import Names
 from ..prediction import ErrorsByPart
 from .geometry import Interval
@@ -22,6 +23,12 @@ def told(known: Interval) -> bool:
     """Return whether value, low and high of a positive quantity are narrow enough to count."""
     _, low, high = known
     return low > 0.0 and 0.5 * math.log(high / low) <= WIDEST
+
+
+def text_of(template: str, **given: Any) -> str:
+    """Return the text of one of ``templates/``."""
+    text = page_template(__package__, f"templates/{template}.j2", html=False).render(**given)
+    return text.removesuffix("\n")
 
 
 class Estimate(NamedTuple):

@@ -8,13 +8,14 @@ section 13.4).
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.arrays import Array, Complex
+from ...runtime.arrays import Array, Complex, Floats
 from ..logs.table import Pair
+from ..motion.smoothing import mean_square
 
 _SEGMENT = 5.0  # s, length of one transform; the inverse is the step of frequency
 TAPERS = 3  # sine tapers (Riedel and Sidorenko, 1995): a low leak, and little lost
@@ -34,38 +35,41 @@ class Segment(NamedTuple):
 
     log: int
     span: Pair  # s, first and last sample
-    frequency: Array  # (m,) Hz
+    frequency: Floats  # (m,) Hz
     weight: Array  # (m,): 2 of a complex number, 1 of a real one; over the number of tapers
+    passed: Floats  # (m,): share of an amplitude behind the columns' low-pass
     columns: Complex  # (K, m, c): per root Hz
 
 
-def segments_of(columns: Array, t: Array, period: float, log: int, band: float) -> list[Segment]:
-    """Return the transforms of a piece's columns (n, c) at times (n,), cut into segments of about
+def segments_of(
+    columns: Array, t: Array, period: float, log: int, band: float
+) -> Iterator[Segment]:
+    """Yield the transforms of a piece's columns (n, c) at times (n,), cut into segments of about
     equal length.
     """
-    out, n = [], len(columns)
+    n = len(columns)
     edges = np.linspace(0, n, 1 + max(1, round(n * period / _SEGMENT))).astype(np.int64)
     for a, b in itertools.pairwise(edges):
         size = b - a
-        frequency = np.asarray(np.fft.rfftfreq(size, period), np.float64)
+        frequency = np.fft.rfftfreq(size, period)
         inside = frequency <= min(band, 0.4 / period)
         frequency = frequency[inside]
         weight = np.where(frequency == 0.0, 1.0, 2.0) / TAPERS
-        places = np.arange(1, size + 1) * (np.pi / (size + 1))
-        waves = np.sin(np.arange(1, TAPERS + 1)[:, None, None] * places[:, None])
+        places = np.linspace(0.0, np.pi, size + 2)[1:-1]
+        waves = np.sin(np.outer(np.arange(1, TAPERS + 1), places))[..., None]
         tapers = np.sqrt(2.0 * period / (size + 1)) * waves
         transforms = np.fft.rfft(tapers * columns[a:b], axis=1)[:, inside]
-        out.append(Segment(log, (t[a], t[b - 1]), frequency, weight, transforms))
-    return out
+        passed = 1.0 / (1.0 + (frequency / band) ** 4)
+        yield Segment(log, (t[a], t[b - 1]), frequency, weight, passed, transforms)
 
 
-def residual_spectra(segments: Sequence[Segment], powers: Spectra) -> Spectra:
-    """Return, for each segment, the spectrum (m, 6) of residuals with given powers (m, 6): smoothed
-    over the segments of a log and over frequency, infinite at no power. Segments of a log stand
-    together.
+def residual_spectra(segments: Iterable[Segment], residuals: Iterable[Complex]) -> Spectra:
+    """Return, for each segment, the spectrum (m, c) of residuals with transforms (K, m, c): their
+    power, smoothed over the segments of a log and over frequency, infinite where there is none.
+    Segments of a log stand together.
     """
-    out: Spectra = []
-    pairs = zip(segments, powers, strict=True)
+    out = []
+    pairs = zip(segments, (mean_square(np.abs(x)) for x in residuals), strict=True)
     for _, group in itertools.groupby(pairs, key=lambda pair: pair[0].log):
         of_log, each = zip(*group, strict=True)
         frequency = np.concatenate([s.frequency for s in of_log])

@@ -29,6 +29,23 @@ GOOD = {
     "k": [8e-6, 8.1e-6, 7.9e-6, 8e-6],
     "p": [2e-7, 2.1e-7, 1.9e-7, 2e-7],
 }
+WHOLE = """
+name: "Möwe: 1"
+inertia: [[0.002, 1.0e-4, 0], [1.0e-4, 0.003, 0], [0, 0, 0.004]]
+com: [0.01, 0.0, -0.02]
+rotor_positions: [[0.1, 0.12, 0.01], [-0.1, 0.12, 0], [-0.1, -0.12, 0], [0.1, -0.12, 0]]
+spin: [1, -1, 1, -1]
+omega_lsb: 2.5
+omega_source: commanded
+voltage_ref: 11.1
+floor_z: -0.5
+ceiling_z: 2.5
+gravity: 9.8
+rotor_radius: 0.11
+mocap: {rate_hz: 100.0, sigma_pos_m: 0.002}
+motor_curve: {thrust: [0.0, 0.02, 0.1], voltage_exponent: 2.0, command: [0.0, 65535.0]}
+effects: [{name: rotor_drag, coefficients: {kdx: 1.0e-4, kdy: 2.0e-4}}]
+"""
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -51,28 +68,7 @@ def test_the_measured_flights_vehicle_loads():
 
 
 def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
-    given = {
-        **GOOD,
-        "name": "Möwe: 1",
-        "inertia": [[0.002, 1e-4, 0], [1e-4, 0.003, 0], [0, 0, 0.004]],
-        "com": [0.01, 0.0, -0.02],
-        "rotor_positions": [[0.1, 0.12, 0.01], [-0.1, 0.12, 0], [-0.1, -0.12, 0], [0.1, -0.12, 0]],
-        "spin": [1, -1, 1, -1],
-        "omega_lsb": 2.5,
-        "omega_source": "commanded",
-        "voltage_ref": 11.1,
-        "floor_z": -0.5,
-        "ceiling_z": 2.5,
-        "gravity": 9.8,
-        "rotor_radius": 0.11,
-        "mocap": {"rate_hz": 100.0, "sigma_pos_m": 0.002},
-        "motor_curve": {
-            "thrust": [0.0, 0.02, 0.1],
-            "voltage_exponent": 2.0,
-            "command": [0.0, 65535.0],
-        },
-        "effects": [{"name": "rotor_drag", "coefficients": {"kdx": 1.0e-4, "kdy": 2.0e-4}}],
-    }
+    given = GOOD | yaml.safe_load(WHOLE)
     vehicle = parse_vehicle(yaml.safe_dump(given))
     curve = MotorCurve((0.0, 0.02, 0.1), 2.0, (0.0, 65535.0))
     assert vehicle.motor_curve == curve

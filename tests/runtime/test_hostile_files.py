@@ -29,12 +29,13 @@ from windwrench.controllers.trained_policy import FORMAT, load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.identification import read_log
 from windwrench.identification.logs import tables, text_table
-from windwrench.identification.logs.flight_log import REQUIRED
+from windwrench.identification.logs.flight_log import POSE, ROTORS
 from windwrench.runtime import regular_files
 from windwrench.runtime.file_limits import LIMITS
 from windwrench.runtime.regular_files import read_json
 from windwrench.runtime.yaml_file import parse_yaml
 
+REQUIRED = ("t", *POSE, *ROTORS)
 HEADER = (",".join(REQUIRED) + "\n").encode()
 # an eighth of what users may have
 SIZES = ("table_text", "table_rows", "table_numbers", "list_numbers", "arrays", "binary_log")

@@ -5,8 +5,8 @@ inverses: slow, and the judges of the fast ones. They share no code with them.
 import numpy as np
 from numpy.linalg import inv
 from numpy.random import default_rng
+from scipy.spatial.transform import Rotation
 
-from tests.support.flights import matrix
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator.reference import ReferenceUKF, difference, displaced
 
@@ -42,7 +42,7 @@ def rotor_effects(vehicle, drag=0.0, ground=0.0):
     com = compile_effects(vehicle).vehicle.com
 
     def wrench(x, q, v, w, W):
-        C = matrix(q)
+        C = Rotation.from_quat(q, scalar_first=True).as_matrix()
         force = np.zeros(3)
         torque = np.zeros(3)
         for corner, rate, k in zip(CORNERS, W, vehicle.k, strict=True):

@@ -8,7 +8,7 @@ from numpy.linalg import lstsq
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
-from tests.support.flown import VEHICLE, resting
+from tests.support.flown import VEHICLE, resting, without_pose
 from tests.support.imu_flights import imu_flight, pose_removed
 from tests.support.outcomes import refused
 from windwrench.dynamics.vehicle import EffectSetting
@@ -21,6 +21,7 @@ from windwrench.identification.diagnosis.regression import RegressedFlights
 from windwrench.identification.diagnosis.row_nuisances import answered, followers
 from windwrench.identification.diagnosis.rows import Rows
 from windwrench.identification.diagnosis.worth import worth
+from windwrench.identification.motion.pose_clock import on_pose_clock
 
 LIBRARY = ["com_offset", "rate_damping", "thrust_scale", "rotor_efficiency", "constant_torque"]
 OFFSET = EffectSetting("com_offset", {"cx": 0.01, "cy": 0.0, "cz": 0.0})
@@ -53,8 +54,8 @@ def test_a_still_flight_without_noise_is_diagnosed():
     """Columns that do not vary carry nothing; what is known to the last digit is no more."""
     rng = default_rng(0)
     count = 2101
-    place = [0.0, 0.0, 1.0] + 1e-9 * rng.standard_normal((count, 3))
-    log = resting(0.005 * np.arange(count), position=place)
+    pose = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0] + 1e-9 * rng.standard_normal((count, 7))
+    log = resting(0.005 * np.arange(count), position=pose[:, :3], quaternion=pose[:, 3:])
     found = diagnose([log], VEHICLE)
     assert all(e.tentative for e in found.effects)
 
@@ -154,6 +155,12 @@ def test_what_a_few_positions_add():
     assert {"rotor_drag", "wind", "fan_jet"} <= alone.needs_pose
     assert "rotor_drag" not in placed.not_identifiable
     assert not {"rotor_efficiency", "motor_lag", "inertia"} & alone.not_identifiable
+
+
+def test_rare_poses_leave_the_rows_of_an_imu():
+    log = imu_flight(VEHICLE, seconds=5.0)
+    rare = without_pose(log, np.arange(len(log.t)) % 20 > 0)
+    assert on_pose_clock(rare) is rare
 
 
 def test_a_pose_and_an_imu_are_not_mixed():

@@ -11,7 +11,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_array_equal
 
 from tests.support.programs import said
-from windwrench.identification.logs.flight_log import REQUIRED
+from windwrench.identification.logs.flight_log import POSE, ROTORS
 from windwrench.identification.logs.text_table import open_table
 from windwrench.runtime.file_limits import LIMITS
 
@@ -107,7 +107,7 @@ for path in map(Path, sys.argv[1:]):
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory as Linux tells it")
 def test_the_memory_of_a_check_is_in_proportion_to_the_numbers_that_are_read(tmp_path):
-    header = [*REQUIRED, "vbat", "fx", "fy", "fz", "tx", "ty", "tz"]
+    header = ["t", *POSE, *ROTORS, "vbat", "fx", "fy", "fz", "tx", "ty", "tz"]
     columns = default_rng(0).normal(0.0, 0.001, (1000, len(header) - 1))
     columns[:, 3:7] = 1.0, 0.0, 0.0, 0.0
     columns[:, 7:11] += 300.0

@@ -36,16 +36,19 @@ from windwrench.identification.logs.commanded_speeds import with_commanded_speed
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
+from windwrench.identification.motion.signals import in_body, log_signals
+from windwrench.identification.motion.smoothing import resampled
 from windwrench.identification.prediction import PredictionErrors, predict
 from windwrench.identification.vehicle_fit.channels import MotionPiece, Sources
+from windwrench.identification.vehicle_fit.columns import balance
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.held_out import OTHER_FLIGHTS, HeldOut, standing
-from windwrench.identification.vehicle_fit.identify import identify
+from windwrench.identification.vehicle_fit.identify import checked_pieces, identify
 from windwrench.identification.vehicle_fit.model import Model
 from windwrench.identification.vehicle_fit.parameters import first_model
 from windwrench.identification.vehicle_fit.report import explained, headline, use_of
-from windwrench.identification.vehicle_fit.solve import nearest_body
+from windwrench.identification.vehicle_fit.solve import _grams, nearest_body
 from windwrench.identification.vehicle_fit.spectra import LOSS, segments_of
 from windwrench.identification.wrench_series import estimate_log
 
@@ -187,6 +190,37 @@ def test_an_imu_and_commands_are_enough():
     assert thrust.sum() == pytest.approx(MASS * 9.81, rel=0.05)
 
 
+def test_quick_changes_of_velocity_are_the_accelerometers():
+    """The noise of a pose made drag too small."""
+    log = recorded(seconds=10.0)
+    (s,) = log_signals(log)
+    felt = in_body(s.acceleration + np.array([0.0, 0.0, 9.81]), s.rotation)
+    imu = resampled(log.t, s.t, np.hstack([felt, s.angular_velocity]))
+    position = log.position + 0.005 * default_rng(0).standard_normal(log.position.shape)
+    blind = replace(log, position=position, gyro=imu[:, 3:])
+    off = []
+    for seen in (blind, replace(blind, accelerometer=imu[:, :3])):
+        ((piece,), _), ((clean,), _) = checked_pieces([seen]), checked_pieces([log])
+        off.append((resampled(clean.t, piece.t, piece.velocity) - clean.velocity)[20:-20].std())
+    assert off[1] < 0.5 * off[0]
+
+
+def test_noise_of_speeds_is_taken_off_slow_torques_too():
+    """A share of answered torque near 1 left less than no power."""
+    rng, t = default_rng(0), np.arange(0.0, 60.0, 0.01)
+    still = np.zeros((len(t), 3))
+    speeds = 500.0 + 5.0 * rng.standard_normal((len(t), 4))
+    piece = MotionPiece(0, t, 0.01, still, still, still, rotors=speeds)
+    sources = Sources("", "gyro", "rotor speeds", False)
+    model = Model(MASS, GIVEN, sources, speed_noise=5.0, free=("delay",))
+    made = balance([piece], model, np.zeros(1))
+    spectra = [np.ones((len(s.frequency), 6)) for s in made.segments]
+    left = np.sum(_grams(made, spectra), axis=0)[3]
+    at = [1 + made.names.index(name) for name in ("x2", "slow x2")]
+    power = sum(np.square(np.abs(s.columns[:, :, at[0] + 5])).sum() for s in made.segments)
+    assert (np.abs(np.diag(left)[at]) < 0.05 * power).all()
+
+
 def test_a_lag_that_a_time_offset_may_be_is_assumed(inertial):
     """The file held it without a doubt. Without any lag thrust would be early."""
     log, _ = inertial[0]
@@ -197,6 +231,14 @@ def test_a_lag_that_a_time_offset_may_be_is_assumed(inertial):
     assert [e.name for e in again.effects] == ["motor_lag"]
     assert again.status.coefficients["motor_lag"] == found.estimates["motor_lag"].status
     assert found.estimates["motor_lag"].status == "assumed"
+
+
+def test_poses_too_seldom_for_a_velocity_leave_the_imu(inertial):
+    log, _ = inertial[0]
+    seldom = np.arange(len(log.t)) % 25 == 0
+    pose = np.where(seldom[:, None], default_rng(0).normal(0.5, 0.001, (len(log.t), 7)), np.nan)
+    log = replace(log, position=pose[:, :3], quaternion=pose[:, 3:], valid=seldom)
+    check(identify([log], MASS, GIVEN), "Jxx", INERTIA[0, 0], 0.05)
 
 
 def test_a_discharge_tells_the_voltage_from_the_thrust_curve(inertial):
@@ -376,6 +418,16 @@ def test_rotors_in_another_order_are_refused(inertial):
     wrong = replace(log, command=log.command[:, [3, 2, 1, 0]])
     with refused("roll turns against"):
         identify([wrong], MASS, GIVEN)
+    (flight,) = posed()
+    with refused("the rotors look permuted: .* are rotors 2,1,3,4"):
+        of_crazyflie([replace(flight, rotor_speeds=flight.rotor_speeds[:, [1, 0, 2, 3]])])
+
+
+def test_flights_of_two_vehicles_are_refused():
+    (flight,) = posed()
+    other = replace(flight, name="heavier", rotor_speeds=1.3 * flight.rotor_speeds)
+    with refused("the same rotor speeds give 69% more thrust than on heavier"):
+        of_crazyflie([flight, other])
 
 
 def test_turning_is_compared_with_torque_at_its_own_delay():
