@@ -77,7 +77,7 @@ def _positive(
     if spread and low > 0.0:
         factor = math.exp(math.hypot(math.log(high / value), 1.96 * spread))
         known = value, value / factor, value * factor
-        how = f"{how}; the interval has {100.0 * spread:g} % from day to day"
+        how = f"{how}; the interval includes {100.0 * spread:g} % from day to day"
     wide = f"{how}: the interval is wider than half the value"
     return _estimate(name, known, unit, how, "" if told(known) else wide)
 

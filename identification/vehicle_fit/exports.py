@@ -26,9 +26,9 @@ import numpy as np
 from ...dynamics.effects import Role
 from ..logs.table import Values
 from .effect_settings import LAG, coefficient_of, linear_drag
+from .geometry import AIR_DENSITY
 from .result import Identified, text_of
 
-AIR_DENSITY = 1.225  # kg/m3, at sea level, as in both autopilots
 _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
 
 
@@ -52,8 +52,7 @@ def _autopilot(line: str, most: Values, identified: Identified) -> str:
         share = np.clip(bent @ (thrust / thrust[-1] - u) / (bent @ bent), 0.0, 1.0)
         values[3:] = vehicle.weight / (4.0 * thrust[-1]), share
     known = {p: x for p, x in zip(most, values, strict=True) if np.isfinite(x)}
-    estimates = identified.estimates
-    return text_of("autopilot", line=line, values=known, most=most, estimates=estimates)
+    return text_of("autopilot", line=line, values=known, most=most, estimates=identified.estimates)
 
 
 def _simulator(name: str, identified: Identified) -> str:

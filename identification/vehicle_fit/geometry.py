@@ -11,6 +11,7 @@ from ...runtime.errors import InputError
 Interval = tuple[float, float, float]  # value, low and high
 
 GRAVITY = 9.81  # m/s2
+AIR_DENSITY = 1.225  # kg/m3, at sea level, as in PX4 and ArduPilot
 
 
 # Ratios of the shipped vehicles (0.03 to 0.5 kg), for quantities missing from a flight. Behind the

@@ -105,8 +105,8 @@ def identify(
         doubts = ["left out: no piece of 3 s in flight is unbroken in pose and sensors"]
         if i in kept:
             doubts = check_conventions(log, None)
-        if "payload_position" in log.extra:
-            doubts.append("a load is tracked: --mass is that of the vehicle with its load")
+            if "payload_position" in log.extra:
+                doubts.append("a load is tracked: --mass is that of the vehicle with its load")
         notes += [f"warning: {log.name}: {text}" for text in doubts]
     logs = [logs[i] for i in kept]
     if text := _unlike(logs, pieces, sources, _ALIKE):

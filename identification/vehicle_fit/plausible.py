@@ -4,7 +4,7 @@ import math
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .exports import AIR_DENSITY
+from .geometry import AIR_DENSITY
 
 # N/m2, weight over the rotors' discs: the shipped vehicles have 36 to 40, a racer 143
 _LOADINGS = (3.0, 3000.0)
